@@ -1,0 +1,1 @@
+"""Curves, weld frames, postures and body distances."""
