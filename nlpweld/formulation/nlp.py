@@ -1,0 +1,87 @@
+"""The one type solvers know: named variables in a box, an objective to maximise, and named constraints."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy.stats import qmc
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """What the exact model says of a batch of candidates.
+
+    Attributes:
+        objective: value to maximise, shape (m,); defined for infeasible candidates too, -inf where it has no meaning.
+        violation: how far each constraint is missed, shape (m, K), zero when it holds with the solvers' margin.
+        mode: index of the discrete choice (e.g. branch combination) that was best for each candidate, shape (m,).
+    """
+
+    objective: np.ndarray
+    violation: np.ndarray
+    mode: np.ndarray
+
+    @property
+    def total(self) -> np.ndarray:
+        """Sum of all violations, shape (m,)."""
+        return self.violation.sum(axis=1)
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Whether every constraint holds, shape (m,)."""
+        return self.total == 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxation:
+    """A smooth penalised problem: minimise ``value(x, sharpness)`` over the box.
+
+    Attributes:
+        value: ``(x, sharpness) -> scalar``; soft penalties that tend to the exact constraints as sharpness grows.
+        gradient: ``(x, sharpness) -> (1, n)`` or (n, 1).
+        hessian: ``(x, sharpness) -> (n, n)``.
+    """
+
+    value: ca.Function
+    gradient: ca.Function
+    hessian: ca.Function
+
+
+@dataclass(frozen=True, eq=False)
+class Nlp:
+    """A placement problem as solvers see it.
+
+    Attributes:
+        problem: name of the cell or toy.
+        formulation: name of the formulation.
+        names: names of the variables.
+        lower: lower bounds, shape (n,).
+        upper: upper bounds, shape (n,).
+        constraints: names of the columns of ``Evaluation.violation``.
+        evaluate: exact model over candidates X (m, n).
+        unpack: ``(x, mode) -> `` a Plan, or a report that says why there is none; None for toys.
+        relax: ``mode -> Relaxation``; None where there are no derivatives.
+        n_modes: number of discrete choices.
+    """
+
+    problem: str
+    formulation: str
+    names: tuple[str, ...]
+    lower: np.ndarray
+    upper: np.ndarray
+    constraints: tuple[str, ...]
+    evaluate: Callable[[np.ndarray], Evaluation]
+    unpack: Callable[[np.ndarray, int], Any] | None = None
+    relax: Callable[[int], Relaxation] | None = None
+    n_modes: int = 1
+
+    def starts(self, seed: int, count: int) -> np.ndarray:
+        """Return start points in the box, shape (count, n): one uniformly random, more as a scrambled Sobol set."""
+        rng = np.random.default_rng(seed)
+        if count == 1:
+            return rng.uniform(self.lower, self.upper, (1, len(self.lower)))
+        power = int(np.ceil(np.log2(count)))
+        unit = qmc.Sobol(len(self.lower), rng=rng).random_base2(power)[:count]
+        return qmc.scale(unit, self.lower, self.upper)

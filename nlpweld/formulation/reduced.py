@@ -1,0 +1,82 @@
+"""The reduced form: three placement variables, joints eliminated by inverse kinematics."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from nlpweld.cell.cell import Cell
+from nlpweld.formulation.batch import CONSTRAINTS, Batch, allowed
+from nlpweld.formulation.coupling import point_data
+from nlpweld.formulation.nlp import Nlp
+from nlpweld.formulation.paths import joint_paths, on_best_wrist
+from nlpweld.formulation.smooth import relaxation
+from nlpweld.geometry.seam import seam_parameters
+from nlpweld.kinematics.ik import WRIST, signs
+from nlpweld.plan import Plan
+
+
+@dataclass(frozen=True)
+class OutOfReach:
+    """Why a placement has no joint paths.
+
+    Attributes:
+        station: name of the robot that cannot reach.
+        point: the worst seam point.
+        miss: the squared sine of the elbow's opening there, negative.
+    """
+
+    station: str
+    point: int
+    miss: float
+
+
+def reduced(cell: Cell) -> Nlp:
+    """Return the reduced form of a cell: variables are the origin of C in W [m] (Pan et al., the three genes)."""
+    batch = Batch(cell)
+    return Nlp(
+        problem=cell.name,
+        formulation="reduced",
+        names=("x_m", "y_m", "z_m"),
+        lower=cell.box[0],
+        upper=cell.box[1],
+        constraints=CONSTRAINTS,
+        evaluate=batch.evaluate,
+        unpack=Unpacker(batch),
+        relax=lambda mode: relaxation(batch.stage, batch.modes[mode]),
+        n_modes=len(batch.modes),
+    )
+
+
+@dataclass(frozen=True)
+class Unpacker:
+    """Turns a placement and a mode into joint paths."""
+
+    batch: Batch
+
+    def __call__(self, x: np.ndarray, mode: int) -> Plan | OutOfReach:
+        """Return the plan of placement x (3,) [m] on a mode's branches, or who cannot reach which point."""
+        cell, paths, branches = self.batch.cell, {}, {}
+        for k, station in enumerate(cell.stations):
+            shoulder, elbow = self.batch.modes[mode][k]
+            cos_sin, reach = self._solve(k, x, (shoulder, elbow))
+            if reach.min() < 0.0:
+                return OutOfReach(station.name, int(reach.argmin()), float(reach.min()))
+            q = joint_paths(station.robot, list(cos_sin[:, None, :]))
+            wrists = allowed(cell.configuration.wrist, WRIST)
+            need = np.radians(cell.constraints.joint_margin_deg)
+            settled, _, best = on_best_wrist(station.robot, q, wrists, need)
+            paths[station.name], wrist = settled[0, :, :-1].T, wrists[best[0]]
+            branches[station.name] = (shoulder, elbow, wrist)
+        return Plan(cell, np.asarray(x, dtype=float), seam_parameters(cell), paths, branches)
+
+    @cached_property
+    def _points(self) -> np.ndarray:
+        return point_data(self.batch.cell, seam_parameters(self.batch.cell))
+
+    def _solve(self, k: int, x: np.ndarray, branch: tuple[str, str]) -> tuple[np.ndarray, np.ndarray]:
+        """Return cosines and sines (12, N) and reach (N,) of station k by the CasADi graph itself."""
+        n = self._points.shape[1]
+        out = self.batch.stage.arms[k].map(n)(np.repeat(np.reshape(x, (3, 1)), n, axis=1), self._points, np.array([signs((*branch, "noflip"))] * n).T)
+        cos_sin = np.array(out[0]).reshape(6, n, 2).transpose(2, 0, 1).reshape(12, n)
+        return cos_sin, np.array(out[3]).ravel()

@@ -1,0 +1,1 @@
+"""Kinematics of serial chains in CasADi: forward, Jacobian, closed-form inverse, manipulability."""

@@ -1,0 +1,183 @@
+"""Reference kinematics in plain NumPy: link poses, Jacobians and the poses the weld asks for.
+
+Written apart from ``nlpweld.kinematics`` and ``nlpweld.formulation``, so that a mistake there is not repeated here.
+Every function works on M configurations at once; poses are homogeneous matrices named ``T_a_b``.
+"""
+
+import numpy as np
+
+from nlpweld.cell import Cell, Grasp, Robot, Station
+from nlpweld.geometry.seam import weld_frames
+
+
+def rpy_matrix(rpy_deg: tuple[float, float, float]) -> np.ndarray:
+    """Return ``Rz(yaw) Ry(pitch) Rx(roll)`` from (roll, pitch, yaw) [deg], shape (3, 3); the URDF convention."""
+    roll, pitch, yaw = (_axis_angle(axis, np.radians(a)) for axis, a in zip(np.eye(3), rpy_deg, strict=True))
+    return yaw @ pitch @ roll
+
+
+def base_pose(station: Station) -> np.ndarray:
+    """Return T_W_B of a station, shape (4, 4)."""
+    return _pose(rpy_matrix(station.base_rpy_deg), np.array(station.base_position_m))
+
+
+def tool_pose(station: Station) -> np.ndarray:
+    """Return T_F_E, the TCP in the flange frame, shape (4, 4): translation first, then rotation."""
+    return _pose(rpy_matrix(station.tool.rpy_deg), np.array(station.tool.translation_m))
+
+
+def joint_transforms(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Return ``Rz(q + offset) Tz(d) Tx(a) Rx(alpha)`` of every joint (standard Denavit-Hartenberg).
+
+    Args:
+        robot: the robot with n joints.
+        q: joint angles in DH direction, shape (M, n) [rad].
+
+    Returns:
+        T_{i-1}_i, shape (M, n, 4, 4).
+    """
+    a, d, alpha, offset = robot.dh.T
+    ct, st = np.cos(q + offset), np.sin(q + offset)
+    ca, sa = np.cos(alpha), np.sin(alpha)
+    T = np.zeros((*q.shape, 4, 4))
+    T[..., 0, 0], T[..., 0, 1], T[..., 0, 2], T[..., 0, 3] = ct, -st * ca, st * sa, a * ct
+    T[..., 1, 0], T[..., 1, 1], T[..., 1, 2], T[..., 1, 3] = st, ct * ca, -ct * sa, a * st
+    T[..., 2, 1], T[..., 2, 2], T[..., 2, 3], T[..., 3, 3] = sa, ca, d, 1.0
+    return T
+
+
+def link_poses(station: Station, q: np.ndarray) -> np.ndarray:
+    """Return T_W_L of link 0 (the base) to link n (the flange), shape (M, n + 1, 4, 4).
+
+    Args:
+        station: the robot at its place.
+        q: joint angles, shape (M, n) [rad].
+    """
+    steps = joint_transforms(station.robot, q)
+    poses = np.empty((q.shape[0], q.shape[1] + 1, 4, 4))
+    poses[:, 0] = base_pose(station)
+    for i in range(q.shape[1]):
+        poses[:, i + 1] = poses[:, i] @ steps[:, i]
+    return poses
+
+
+def tcp_pose(station: Station, T_W_L: np.ndarray) -> np.ndarray:
+    """Return T_W_E, shape (M, 4, 4), from the link poses (M, n + 1, 4, 4)."""
+    return T_W_L[:, -1] @ tool_pose(station)
+
+
+def jacobian(T_W_L: np.ndarray, T_W_E: np.ndarray) -> np.ndarray:
+    """Return the geometric Jacobian (v; omega) of the TCP in W, shape (M, 6, n) [m/rad; 1].
+
+    Joint i turns about the z axis of link i - 1 (standard Denavit-Hartenberg).
+    """
+    z = T_W_L[:, :-1, :3, 2]
+    arm = T_W_E[:, None, :3, 3] - T_W_L[:, :-1, :3, 3]
+    return np.concatenate([np.cross(z, arm), z], axis=-1).swapaxes(-1, -2)
+
+
+def manipulability(J: np.ndarray) -> np.ndarray:
+    """Return w = sqrt(det(J J^T)) (Pan et al., eq. 11), shape (M,) [m^3], as the product of the singular values of J.
+
+    Args:
+        J: geometric Jacobians, shape (M, 6, n); fewer than six joints give zero.
+    """
+    if J.shape[-1] < J.shape[-2]:
+        return np.zeros(J.shape[0])
+    return np.linalg.svd(J, compute_uv=False).prod(axis=-1)
+
+
+def body_ends(station: Station, T_W_L: np.ndarray, T_W_E: np.ndarray) -> np.ndarray:
+    """Return both axis ends of every capsule of arm and tool in W, shape (M, bodies, 2, 3) [m]."""
+    ends = np.empty((T_W_L.shape[0], len(station.bodies), 2, 3))
+    for b, body in enumerate(station.bodies):
+        for e, end in enumerate((body.start, body.end)):
+            T = T_W_E if end.frame == "tcp" else T_W_L[:, int(end.frame.removeprefix("link"))]
+            ends[:, b, e] = T[:, :3, :3] @ np.array(end.at_m) + T[:, :3, 3]
+    return ends
+
+
+def workpiece_ends(cell: Cell, T_W_C: np.ndarray) -> np.ndarray:
+    """Return both axis ends of every capsule of the workpiece in W, shape (M, bodies, 2, 3) [m]."""
+    p_C = np.array([(body.start_m, body.end_m) for body in cell.workpiece.bodies])
+    return np.einsum("mij,bej->mbei", T_W_C[:, :3, :3], p_C) + T_W_C[:, None, None, :3, 3]
+
+
+def flat_rotation(normal: np.ndarray) -> np.ndarray:
+    """Return the smallest rotation that turns each unit vector to +z (position PA; Pan et al., Fig. 7).
+
+    Args:
+        normal: shape (M, 3). The opposite of +z has no smallest rotation; it is turned about x.
+
+    Returns:
+        Rotations by the angle between normal and z about normal x z, shape (M, 3, 3).
+    """
+    across = np.cross(normal, [0.0, 0.0, 1.0])
+    sine = np.linalg.norm(across, axis=-1)
+    safe = np.where(sine > 1e-15, sine, 1.0)
+    axis = np.where(sine[:, None] > 1e-15, across / safe[:, None], [1.0, 0.0, 0.0])
+    return _axis_angle(axis, np.arctan2(sine, normal[:, 2]))
+
+
+def workpiece_pose(cell: Cell, c: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Return T_W_C(s) = (R(s), c): the workpiece turned flat for each weld point, shape (M, 4, 4).
+
+    Args:
+        cell: the cell; its seam and posture are used.
+        c: origin of C in W, shape (3,) [m].
+        s: seam parameter, shape (M,); whole turns do not matter.
+    """
+    return _pose(flat_rotation(weld_frames(cell, s).normal_C), c)
+
+
+def required_pose(cell: Cell, station: Station, c: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Return the T_W_E that the weld asks of one robot, shape (M, 4, 4).
+
+    A handler is rigid to the workpiece (Pan et al., eq. 1, 4, 5). The torch's TCP is at the weld point with
+    z straight down and x along the heading (eq. 2).
+
+    Args:
+        cell: the cell.
+        station: one of its stations.
+        c: origin of C in W, shape (3,) [m].
+        s: seam parameter, shape (M,).
+    """
+    T_W_C = workpiece_pose(cell, c, s)
+    if isinstance(station.coupling, Grasp):
+        return T_W_C @ station.coupling.T_C_E
+    p_C = weld_frames(cell, s).p_C
+    heading = np.radians(station.coupling.heading_deg)
+    x, z = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([0.0, 0.0, -1.0])
+    return _pose(np.column_stack([x, np.cross(z, x), z]), np.einsum("mij,mj->mi", T_W_C[:, :3, :3], p_C) + c)
+
+
+def pose_error(T_W_D: np.ndarray, T_W_E: np.ndarray) -> np.ndarray:
+    """Return what takes pose E to the desired pose D: (translation [m], rotation vector [rad]) in W, shape (M, 6)."""
+    R = T_W_D[:, :3, :3] @ T_W_E[:, :3, :3].swapaxes(-1, -2)
+    vee = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=-1) / 2
+    sine = np.linalg.norm(vee, axis=-1)
+    angle = np.arctan2(sine, (np.trace(R, axis1=1, axis2=2) - 1) / 2)
+    # At half a turn the skew part vanishes and the axis is lost; any axis keeps the size of the error.
+    axis = np.where(sine[:, None] > 1e-300, vee / np.maximum(sine, 1e-300)[:, None], [1.0, 0.0, 0.0])
+    return np.concatenate([T_W_D[:, :3, 3] - T_W_E[:, :3, 3], axis * angle[:, None]], axis=-1)
+
+
+def error_size(error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (position error [m], rotation angle [rad]), each of shape (M,), of errors of shape (M, 6)."""
+    return np.linalg.norm(error[:, :3], axis=-1), np.linalg.norm(error[:, 3:], axis=-1)
+
+
+def _axis_angle(axis: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
+    """Return rotations about unit axes (..., 3) by angles (...) [rad], shape (..., 3, 3) (Rodrigues)."""
+    x, y, z = np.moveaxis(np.asarray(axis, dtype=float), -1, 0)
+    zero = np.zeros_like(x)
+    K = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
+    a = np.asarray(angle)[..., None, None]
+    return np.eye(3) + np.sin(a) * K + (1 - np.cos(a)) * (K @ K)
+
+
+def _pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Join rotations (..., 3, 3) and positions (..., 3) into poses, shape (..., 4, 4)."""
+    T = np.zeros((*np.broadcast_shapes(R.shape[:-2], p.shape[:-1]), 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, p, 1.0
+    return T

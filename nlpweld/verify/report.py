@@ -1,0 +1,245 @@
+"""What the checker found: every number of a plan, and what it breaks by how much and where."""
+
+import math
+import textwrap
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from nlpweld.cell import Cell
+
+# An excess of this size [in the constraint's own unit] counts as equally bad; constraints not named come first.
+SCALE = {
+    ("box", "m"): 0.05,
+    ("closure", "m"): 1e-3,
+    ("closure", "rad"): 1e-3,
+    ("continuity", "rad"): 0.1,
+    ("continuity", "m"): 0.01,
+    ("joint_limit", "rad"): 0.1,
+    ("singularity", "m^3"): 0.02,
+    ("clearance", "m"): 0.02,
+}
+SHOWN = 8
+WIDTH = 79
+
+
+@dataclass(frozen=True)
+class Violation:
+    """One broken constraint, at the worst place.
+
+    Attributes:
+        constraint: ``finite``, ``points``, ``box``, ``closure``, ``continuity``, ``branch``, ``joint_limit``,
+            ``singularity``, ``clearance`` or ``reach``.
+        robot: station name (of the first body of a pair), ``workpiece``, or None where no robot is to blame.
+        point: index of the plan's point at or before the place, or None.
+        value: what was found, in ``unit``.
+        limit: what it may be at most or at least.
+        s: seam parameter of the place.
+        joint: ``J1`` to ``Jn``.
+        pair: the two bodies.
+        unit: of value and limit.
+        note: what the numbers alone do not say.
+    """
+
+    constraint: str
+    robot: str | None
+    point: int | None
+    value: float
+    limit: float
+    s: float | None = None
+    joint: str | None = None
+    pair: str | None = None
+    unit: str = ""
+    note: str = ""
+
+    @property
+    def severity(self) -> float:
+        """Excess over the limit in units of ``SCALE``; infinite for what has no scale or no number."""
+        scale = SCALE.get((self.constraint, self.unit))
+        excess = abs(self.value - self.limit)
+        return excess / scale if scale and math.isfinite(excess) else math.inf
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Violations with the same key are one, told once."""
+        return (self.constraint, self.pair or self.robot or "", self.joint or "", self.unit)
+
+    def __str__(self) -> str:
+        """Return one line: what, who, where, by how much."""
+        who = " ".join(part for part in (self.pair or self.robot, self.joint) if part)
+        where = "" if self.point is None else f" at point {self.point}"
+        where += "" if self.s is None else f" (s {self.s:.4f})"
+        numbers = f": {self.value:.6g} {self.unit}, limit {self.limit:.6g}" if math.isfinite(self.value) else ""
+        return f"{self.constraint} {who}{where}{numbers}{'; ' + self.note if self.note else ''}"
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """Everything the checker found out about one plan or placement.
+
+    ``*_mean``, ``mmr_min`` and ``mmr_max`` are over the N points of the seam; ``manipulability_min`` too.
+    ``clearance_m``, ``joint_margin_rad`` and ``singularity_min`` are over the whole seam, between the points too.
+
+    Attributes:
+        cell: name of the cell.
+        at: placement of the origin of C in W [m].
+        n_points: number of points N.
+        reading: the reading of Pan et al., eq. (16), that MMR has.
+        mmr_mean: the objective; its unit depends on the reading ("paper" adds m^6 to m^3).
+        mmr_min: least of the N points.
+        mmr_max: greatest of the N points.
+        m_tight_mean: mean product of the tight robots' w (eq. 15) [m^3 for each].
+        m_loose_mean: mean product of the loose robots' w [m^3 for each].
+        manipulability_mean: by station name [m^3].
+        manipulability_min: by station name [m^3].
+        singularity_min: by station name [m^3].
+        clearance_m: least distance of any pair looked at; negative is penetration.
+        closest_pair: the two bodies of that pair.
+        closest_s: where on the seam.
+        joint_margin_rad: least distance of any joint from a limit; negative is beyond.
+        closure_m: largest position error of any TCP at the points.
+        closure_rad: largest rotation error of any TCP at the points.
+        samples: number of configurations looked at.
+        feasible: no violation.
+        violations: worst first, one for each constraint, robot or pair, and joint.
+        profile: arrays over the N points, by name; those of a robot as ``name.station``.
+    """
+
+    cell: str
+    at: tuple[float, float, float]
+    n_points: int
+    reading: str
+    mmr_mean: float
+    mmr_min: float
+    mmr_max: float
+    m_tight_mean: float
+    m_loose_mean: float
+    manipulability_mean: dict[str, float]
+    manipulability_min: dict[str, float]
+    singularity_min: dict[str, float]
+    clearance_m: float
+    closest_pair: str | None
+    closest_s: float | None
+    joint_margin_rad: float
+    closure_m: float
+    closure_rad: float
+    samples: int
+    feasible: bool
+    violations: tuple[Violation, ...]
+    profile: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def without_plan(
+        cls,
+        cell: Cell,
+        at: tuple[float, float, float] | np.ndarray,
+        n_points: int,
+        violations: list[Violation] | tuple[Violation, ...],
+    ) -> "Report":
+        """Return the report of a placement for which there is no plan to measure; its numbers are NaN.
+
+        Args:
+            cell: the cell.
+            at: origin of C in W [m].
+            n_points: number of seam points asked for.
+            violations: why there is no plan, e.g. :func:`unreachable`; never feasible, even if empty.
+        """
+        nan = math.nan
+        each = {station.name: nan for station in cell.stations}
+        return cls(
+            cell=cell.name, at=_triple(at), n_points=n_points, reading=cell.objective.reading,
+            mmr_mean=nan, mmr_min=nan, mmr_max=nan, m_tight_mean=nan, m_loose_mean=nan,
+            manipulability_mean=each, manipulability_min=dict(each), singularity_min=dict(each),
+            clearance_m=nan, closest_pair=None, closest_s=None, joint_margin_rad=nan, closure_m=nan, closure_rad=nan,
+            samples=0, feasible=False, violations=worst_first(violations),
+        )  # fmt: skip
+
+    def to_json(self, profile: bool = False) -> dict[str, Any]:
+        """Return plain JSON data; NaN and infinity become None.
+
+        Args:
+            profile: whether to include the arrays over the points.
+        """
+        shallow = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "profile"}
+        shallow["violations"] = [asdict(v) for v in self.violations]
+        if profile:
+            shallow["profile"] = {name: array.tolist() for name, array in self.profile.items()}
+        return {name: _plain(value) for name, value in shallow.items()}
+
+    def __str__(self) -> str:
+        """Return a small table, at most 80 columns wide."""
+        lines = [*self._headline(), *self._numbers()]
+        for violation in self.violations[:SHOWN]:
+            lines += textwrap.wrap(str(violation), WIDTH, initial_indent="  - ", subsequent_indent="      ")
+        more = len(self.violations) - SHOWN
+        return "\n".join([*lines, f"  - and {more} more"] if more > 0 else lines)
+
+    def _headline(self) -> list[str]:
+        at = ", ".join(f"{x:.4g}" for x in self.at)
+        count = len(self.violations)
+        verdict = "feasible" if self.feasible else f"NOT feasible: {count} violation{'s' * (count != 1)}"
+        return textwrap.wrap(f"{self.cell} at ({at}) m, {self.n_points} points: {verdict}", WIDTH)
+
+    def _numbers(self) -> list[str]:
+        if not self.samples:
+            return ["  no plan to measure"]
+        lines = [
+            f"  MMR ({self.reading})".ljust(18) + f"mean {self.mmr_mean:.6g}, {self.mmr_min:.6g} to {self.mmr_max:.6g}",
+            f"  M_tight, M_loose  mean {self.m_tight_mean:.6g}, {self.m_loose_mean:.6g}",
+            "  w [m^3]           mean       least at points   along the seam",
+        ]
+        for name, mean in self.manipulability_mean.items():
+            least, along = self.manipulability_min[name], self.singularity_min[name]
+            lines.append(f"    {name:<15.15} {mean:<10.6f} {least:<17.6f} {along:.6f}")
+        pair = "" if self.closest_pair is None else f", {self.closest_pair} at s {self.closest_s:.4f}"
+        clearance = f"  clearance         {1e3 * self.clearance_m:.3f} mm{pair}"
+        lines += textwrap.wrap(clearance, WIDTH, subsequent_indent=" " * 20)
+        return [
+            *lines,
+            f"  joint margin      {math.degrees(self.joint_margin_rad):.3f} deg",
+            f"  closure           {self.closure_m:.1e} m, {self.closure_rad:.1e} rad; {self.samples} configurations",
+        ]
+
+
+def unreachable(
+    cell: Cell, at: tuple[float, float, float] | np.ndarray, robot: str, point: int, n_points: int, note: str = ""
+) -> Report:
+    """Return the report of a placement where one robot cannot reach one seam point.
+
+    Args:
+        cell: the cell.
+        at: origin of C in W [m].
+        robot: station name.
+        point: index of the seam point, of n_points.
+        n_points: number of seam points asked for.
+        note: more about it, e.g. which joint limit is in the way.
+    """
+    text = note or "no joint angles within the limits reach the pose the weld asks for"
+    violation = Violation("reach", robot, point, math.nan, math.nan, s=point / n_points, note=text)
+    return Report.without_plan(cell, at, n_points, [violation])
+
+
+def worst_first(violations: list[Violation] | tuple[Violation, ...]) -> tuple[Violation, ...]:
+    """Return one violation for each key, the worst, ordered by severity."""
+    kept: dict[tuple[str, ...], Violation] = {}
+    for violation in violations:
+        if violation.key not in kept or violation.severity > kept[violation.key].severity:
+            kept[violation.key] = violation
+    return tuple(sorted(kept.values(), key=lambda v: -v.severity))
+
+
+def _triple(at: tuple[float, float, float] | np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in at)
+    return x, y, z
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON takes it."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

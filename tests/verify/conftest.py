@@ -1,0 +1,58 @@
+"""A feasible plan at the paper's placement, made by marching along the seam: no solver and no closed form."""
+
+import numpy as np
+import pytest
+
+from nlpweld.cell import Cell, load_cell
+from nlpweld.geometry.seam import seam_parameters
+from nlpweld.plan import Plan
+from nlpweld.verify import reference as ref
+from nlpweld.verify.between import close_chain
+from nlpweld.verify.check import verify
+from nlpweld.verify.report import Report
+
+AT = np.array([0.023, -0.266, 0.404])
+# /work/shared/model.md: joint angles at the paper's c and j = 0, in degrees.
+START_DEG = {
+    "handler_1": (137.690, 26.848, 6.920, -1.237, 79.488, -66.037),
+    "handler_2": (49.560, 45.061, 24.204, -107.459, 64.536, -178.979),
+    "welder": (-90.655, 14.161, 3.397, 0.318, 50.443, 179.190),
+}
+
+
+def march(cell: Cell, at: np.ndarray, start: dict[str, np.ndarray]) -> Plan:
+    """Close every chain at every point, each started from the point before."""
+    s = seam_parameters(cell)
+    paths = {}
+    for station in cell.stations:
+        q, rows = start[station.name], []
+        fine = np.arange(720) / 720
+        for pose in ref.required_pose(cell, station, at, fine):
+            found, error = close_chain(station, pose[None], q[None])
+            assert np.abs(error).max() < 1e-9
+            q = found[0]
+            rows.append(q)
+        paths[station.name] = within_limits(np.array(rows), station.robot.limits_rad)[:: 720 // len(s)]
+    return Plan(cell, at, s, paths)
+
+
+def within_limits(path: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """Shift every joint by the whole turns that bring the middle of its path, closing step included, nearest theirs."""
+    whole = np.vstack([path, path[0] + 2 * np.pi * np.round((path[-1] - path[0]) / (2 * np.pi))])
+    middle = (whole.min(axis=0) + whole.max(axis=0)) / 2
+    return path - 2 * np.pi * np.round((middle - limits.mean(axis=1)) / (2 * np.pi))
+
+
+@pytest.fixture(scope="session")
+def cell() -> Cell:
+    return load_cell("three_er16")
+
+
+@pytest.fixture(scope="session")
+def plan(cell: Cell) -> Plan:
+    return march(cell, AT, {name: np.radians(q) for name, q in START_DEG.items()})
+
+
+@pytest.fixture(scope="session")
+def report(plan: Plan) -> Report:
+    return verify(plan)
