@@ -45,7 +45,7 @@ class Plan:
             "s": self.s.tolist(),
             "paths_rad": {name: q.tolist() for name, q in self.paths.items()},
             "branches": self.branches and {name: list(branch) for name, branch in self.branches.items()},
-            "cell": self.cell.model_dump(mode="json"),
+            "cell": self.cell.model_dump(mode="json", exclude_unset=True),
         }
 
     def save(self, path: str | Path) -> Path:

@@ -134,7 +134,7 @@ class Cell(Checked):
         Raises:
             pydantic.ValidationError: a replaced field is not valid.
         """
-        data = self.model_dump(mode="python")
+        data = self.model_dump(mode="python", exclude_unset=True)
         for table, fields in tables.items():
             data[table] = {**data[table], **fields}
         return Cell.model_validate(data)

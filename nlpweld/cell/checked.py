@@ -26,22 +26,21 @@ class Sourced(Checked):
 
     source: str | dict[str, str]
 
-    @model_validator(mode="before")
-    @classmethod
-    def _every_number_has_a_source(cls, data: Any) -> Any:
+    @model_validator(mode="after")
+    def _every_number_has_a_source(self) -> "Sourced":
         """Refuse a table whose ``source`` is empty, misses a number, or names a field that is not there."""
-        if not isinstance(data, dict):
-            return data
-        source = data.get("source")
-        if isinstance(source, str) and not source.strip():
-            raise ValueError("source is empty; say where the numbers come from")
-        if isinstance(source, dict):
-            numbers = {key for key, value in data.items() if key != "source" and holds_number(value)}
-            for key in sorted(numbers - set(source)):
+        texts = {"source": self.source} if isinstance(self.source, str) else self.source
+        for key, text in texts.items():
+            if not text.strip():
+                raise ValueError(f"source of '{key}' is empty; say where the numbers come from")
+        if isinstance(self.source, dict):
+            fields = self.model_fields_set - {"source"}
+            numbers = {name for name in fields if holds_number(getattr(self, name))}
+            for key in sorted(numbers - set(texts)):
                 raise ValueError(f"number '{key}' has no source; add source.{key} = \"...\"")
-            for key in sorted(set(source) - set(data)):
-                raise ValueError(f"source names '{key}', which this table does not have")
-        return data
+            for key in sorted(set(texts) - fields):
+                raise ValueError(f"source names '{key}', which this table does not have; remove it")
+        return self
 
     def source_of(self, field: str) -> str:
         """Return the stated source of one field."""
@@ -49,7 +48,11 @@ class Sourced(Checked):
 
 
 def holds_number(value: Any) -> bool:
-    """Tell whether a value read from a file is a number or a list of them."""
-    if isinstance(value, list | tuple):
+    """Tell whether a field's value is a number or holds one that does not have its own source."""
+    if isinstance(value, Sourced):
+        return False
+    if isinstance(value, Checked):
+        return any(holds_number(getattr(value, name)) for name in value.model_fields_set)
+    if isinstance(value, tuple):
         return any(holds_number(item) for item in value)
     return isinstance(value, int | float) and not isinstance(value, bool)

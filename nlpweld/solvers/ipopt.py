@@ -1,7 +1,7 @@
 """Ipopt on a penalised relaxation, sharpened until the exact model agrees (Waechter and Biegler 2006)."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
@@ -14,62 +14,141 @@ from nlpweld.solvers.base import Budget, Incumbent, Outcome
 class Ipopt:
     """Interior-point solves of ever sharper penalties, each started from the last.
 
+    A descent that ends infeasible (the penalties' own local minimum) is followed by one from the next random
+    start, which is still the same seed's; the message says how many starts it took.
+
     Attributes:
         sharpness: first sharpness of the soft penalties.
         growth: factor from one sharpening to the next.
-        sharpenings: how many solves at most.
+        sharpenings: solves of one descent at most.
         settled: relative gain in objective below which a feasible answer is final.
+        hopeless: total violation after the third solve above which a descent is given up.
+        descents: random starts at most.
+        modes_tried: discrete choices followed from a start, the most promising first.
         tol: Ipopt's tolerance.
         max_iter: Ipopt's iterations per solve.
-        modes_tried: discrete choices solved from the start, most promising first.
     """
 
-    sharpness: float = 10.0
-    growth: float = 4.0
-    sharpenings: int = 8
-    settled: float = 1e-5
-    tol: float = 1e-8
-    max_iter: int = 100
+    sharpness: float = 3.0
+    growth: float = 10.0
+    sharpenings: int = 6
+    settled: float = 1e-4
+    hopeless: float = 1e-3
+    descents: int = 10
     modes_tried: int = 1
+    tol: float = 1e-6
+    max_iter: int = 100
 
     def unsuitable(self, nlp: Nlp) -> str | None:
         """Return why this solver cannot take the problem, or None when it can."""
         return None if nlp.relax else f"formulation '{nlp.formulation}' has no derivatives"
 
     def solve(self, nlp: Nlp, *, seed: int, budget: Budget) -> Outcome:
-        """Solve from one random start in the box."""
+        """Descend from random starts in the box until one ends feasible."""
         search = Incumbent(nlp)
-        start = nlp.starts(seed, 1)[0]
-        mode = int(search.evaluate(start[None]).mode[0])
-        began = time.perf_counter()
-        relax = nlp.relax(mode)
-        solver = _nlpsol(relax, self)
-        build_s = time.perf_counter() - began
-        x, message = start, ""
+        run = _Run(nlp, self, search, budget)
+        for k, start in enumerate(nlp.starts(seed, self.descents)):
+            for mode in self._promising_modes(search, start):
+                run.descend(start, mode)
+            if search.total == 0.0 or run.stopped:
+                break
+        message = f"{run.last}; start {k + 1} of {self.descents}, {run.iterations} iterations"
+        return search.outcome(run.build_s, message, timeout=run.stopped and search.total > 0.0)
 
-        for k in range(self.sharpenings):
-            a=self.sharpness*self.growth**k
-            t=time.perf_counter()
-            r=solver(x0=x,p=a,lbx=nlp.lower,ubx=nlp.upper)
-            st=solver.stats()
-            x=np.array(r["x"]).ravel()
-            e=search.evaluate(x[None])
-            search.log=getattr(search,"log",[])+[(a,st["iter_count"],x.round(4).tolist(),round(float(e.objective[0]),5),e.violation.round(5).tolist())]
-        return search.outcome(build_s,message)
+    def _promising_modes(self, search: Incumbent, start: np.ndarray) -> list[int]:
+        """Return the discrete choices to follow from a start."""
+        if search.nlp.n_modes == 1:
+            return [0]
+        return search.nlp.rank_modes(start)[: self.modes_tried]
 
 
-def _nlpsol(relax: Relaxation, options: Ipopt) -> ca.Function:
-    """Build Ipopt with the relaxation's own gradient and Hessian."""
+@dataclass(eq=False)
+class _Run:
+    """What several descents share: built solvers, the clock, the count."""
+
+    nlp: Nlp
+    options: Ipopt
+    search: Incumbent
+    budget: Budget
+    build_s: float = 0.0
+    iterations: int = 0
+    last: str = ""
+    stopped: bool = False
+    built: dict[int, tuple[ca.Function, "_Watch"]] = field(default_factory=dict)
+
+    def descend(self, start: np.ndarray, mode: int) -> None:
+        """Solve with growing sharpness from one start on one mode."""
+        solver, _ = self._solver(mode)
+        x, before, sharpness = start, float("-inf"), self.options.sharpness
+        for k in range(self.options.sharpenings):
+            solution = solver(x0=x, p=sharpness, lbx=self.nlp.lower, ubx=self.nlp.upper)
+            x, sharpness = np.array(solution["x"]).ravel(), sharpness * self.options.growth
+            self.iterations += solver.stats()["iter_count"]
+            self.last = solver.stats()["return_status"]
+            found = self.search.evaluate(np.clip(x, self.nlp.lower, self.nlp.upper)[None])
+            self.search.note()
+            gain = float(found.objective[0]) - before
+            before = float(found.objective[0])
+            if self.search.out_of(self.budget):
+                self.stopped = True
+                return
+            if k >= 2 and (found.total[0] > self.options.hopeless or found.feasible[0] and gain < self.options.settled * abs(before)):
+                return
+
+    def _solver(self, mode: int) -> tuple[ca.Function, "_Watch"]:
+        if mode not in self.built:
+            began = time.perf_counter()
+            assert self.nlp.relax is not None
+            watch = _Watch(self)
+            self.built[mode] = (nlpsol(self.nlp.relax(mode), self.options, watch), watch)
+            self.build_s += time.perf_counter() - began
+        return self.built[mode]
+
+
+class _Watch(ca.Callback):
+    """Sees every iterate of Ipopt: keeps the path, and stops when the time is up."""
+
+    def __init__(self, run: _Run) -> None:
+        ca.Callback.__init__(self)
+        self.run = run
+        self.construct("watch", {})
+
+    def get_n_in(self) -> int:
+        return ca.nlpsol_n_out()
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_sparsity_in(self, i: int) -> ca.Sparsity:
+        n = len(self.run.nlp.lower)
+        return {"x": ca.Sparsity.dense(n), "f": ca.Sparsity.scalar(), "lam_x": ca.Sparsity.dense(n)}.get(
+            ca.nlpsol_out(i), ca.Sparsity(0, 0) if ca.nlpsol_out(i) != "lam_p" else ca.Sparsity.scalar()
+        )
+
+    def eval(self, arg: list[ca.DM]) -> list[float]:
+        self.run.search.evaluations += 1
+        self.run.search.note(np.array(arg[0]).ravel())
+        return [1.0 if self.run.search.out_of(self.run.budget) else 0.0]
+
+
+def nlpsol(relax: Relaxation, options: Ipopt, watch: ca.Callback) -> ca.Function:
+    """Return Ipopt on a relaxation with its own gradient and Hessian; takes the sharpness as its parameter."""
     x, p = ca.MX.sym("x", relax.value.size1_in(0)), ca.MX.sym("p")
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", 0)
     f = relax.value(x, p)
-    grad = ca.Function("nlp_grad_f", [x, p], [f, relax.gradient(x, p)], ["x", "p"], ["f", "grad_f_x"])
-    hess = ca.Function(
-        "nlp_hess_l", [x, p, lam_f, lam_g], [ca.triu(lam_f * relax.hessian(x, p))],
-        ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"],
+    gradient = ca.Function("nlp_grad_f", [x, p], [f, relax.gradient(x, p)], ["x", "p"], ["f", "grad_f_x"])
+    hessian = ca.Function(
+        "nlp_hess_l",
+        [x, p, lam_f, lam_g],
+        [ca.triu(lam_f * relax.hessian(x, p))],
+        ["x", "p", "lam_f", "lam_g"],
+        ["triu_hess_gamma_x_x"],
     )
     settings = {
-        "print_time": False, "grad_f": grad, "hess_lag": hess,
+        "print_time": False,
+        "grad_f": gradient,
+        "hess_lag": hessian,
+        "iteration_callback": watch,
         "ipopt": {"print_level": 0, "sb": "yes", "tol": options.tol, "max_iter": options.max_iter},
     }
     return ca.nlpsol("ipopt", "ipopt", {"x": x, "p": p, "f": f}, settings)

@@ -160,7 +160,7 @@ def _ends(cell: Cell, c: np.ndarray, s: np.ndarray, q: dict[str, np.ndarray]) ->
     for station in cell.stations:
         T_W_L = ref.link_poses(station, q[station.name])
         ends[station.name] = ref.body_ends(station, T_W_L, ref.tcp_pose(station, T_W_L))
-    return {name: x.reshape(len(s), -1, 3) for name, x in ends.items()}
+    return {name: x.reshape(len(s), 2 * x.shape[1], 3) for name, x in ends.items()}
 
 
 def _steps_m(ends: np.ndarray) -> np.ndarray:

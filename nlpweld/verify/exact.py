@@ -38,6 +38,7 @@ class Watched:
         self._process: subprocess.Popen[bytes] | None = None
         self._owner = 0
         self._said: IO[bytes] | None = None
+        self._last_words = ""
         self._lock = threading.Lock()
 
     def distances(self, ends: np.ndarray, radii: np.ndarray, pairs: np.ndarray) -> np.ndarray:
@@ -53,7 +54,7 @@ class Watched:
                     return answer
                 self.close()
             raise VerifierError(
-                f"the geometry process hung (over {self.limit_s:g} s) or died, twice{self._last_words()}; "
+                f"the geometry process hung (over {self.limit_s:g} s) or died, twice{self._last_words}; "
                 "check that python-fcl works here, then verify again"
             )
 
@@ -64,7 +65,8 @@ class Watched:
             return
         process.kill()
         process.wait()
-        for stream in (process.stdin, process.stdout):
+        self._last_words = self._read_last_words()
+        for stream in (process.stdin, process.stdout, self._said):
             if stream is not None:
                 with contextlib.suppress(OSError):  # bytes left in a pipe to a dead process
                     stream.close()
@@ -80,7 +82,7 @@ class Watched:
         try:
             send(process.stdin, *request)
             return receive(process.stdout, 1)[0]
-        except (EOFError, OSError, ValueError):
+        except (EOFError, OSError, ValueError, OverflowError, MemoryError):  # gone, or answers with rubbish
             return None
         finally:
             watchdog.cancel()
@@ -97,7 +99,7 @@ class Watched:
             self.starts += 1
         return self._process
 
-    def _last_words(self) -> str:
+    def _read_last_words(self) -> str:
         """Return the last line the process wrote to stderr, in brackets."""
         if self._said is None:
             return ""

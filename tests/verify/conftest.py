@@ -12,7 +12,7 @@ from nlpweld.verify.check import verify
 from nlpweld.verify.report import Report
 
 AT = np.array([0.023, -0.266, 0.404])
-# /work/shared/model.md: joint angles at the paper's c and j = 0, in degrees.
+# The model's joint angles at the paper's placement and point 0, one wrist, in degrees.
 START_DEG = {
     "handler_1": (137.690, 26.848, 6.920, -1.237, 79.488, -66.037),
     "handler_2": (49.560, 45.061, 24.204, -107.459, 64.536, -178.979),
@@ -20,19 +20,18 @@ START_DEG = {
 }
 
 
-def march(cell: Cell, at: np.ndarray, start: dict[str, np.ndarray]) -> Plan:
+def march(cell: Cell, at: np.ndarray) -> Plan:
     """Close every chain at every point, each started from the point before."""
     s = seam_parameters(cell)
     paths = {}
     for station in cell.stations:
-        q, rows = start[station.name], []
-        fine = np.arange(720) / 720
-        for pose in ref.required_pose(cell, station, at, fine):
+        q, rows = np.radians(START_DEG[station.name]), []
+        for pose in ref.required_pose(cell, station, at, s):
             found, error = close_chain(station, pose[None], q[None])
             assert np.abs(error).max() < 1e-9
             q = found[0]
             rows.append(q)
-        paths[station.name] = within_limits(np.array(rows), station.robot.limits_rad)[:: 720 // len(s)]
+        paths[station.name] = within_limits(np.array(rows), station.robot.limits_rad)
     return Plan(cell, at, s, paths)
 
 
@@ -50,9 +49,14 @@ def cell() -> Cell:
 
 @pytest.fixture(scope="session")
 def plan(cell: Cell) -> Plan:
-    return march(cell, AT, {name: np.radians(q) for name, q in START_DEG.items()})
+    return march(cell, AT)
 
 
 @pytest.fixture(scope="session")
 def report(plan: Plan) -> Report:
     return verify(plan)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20240607)

@@ -1,0 +1,88 @@
+"""The report as people and programs read it."""
+
+import json
+import math
+
+import pytest
+
+from nlpweld.verify.report import SHOWN, Report, Violation, unreachable, worst_first
+
+
+def violation(value: float, robot: str = "handler_1", joint: str | None = "J4") -> Violation:
+    return Violation("joint_limit", robot, 7, value, 1.0, s=0.1, joint=joint, unit="rad")
+
+
+def test_json_is_plain_and_complete(report: Report):
+    data = report.to_json()
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    means = {
+        "mmr_mean",
+        "mmr_min",
+        "mmr_max",
+        "m_tight_mean",
+        "m_loose_mean",
+        "manipulability_mean",
+        "manipulability_min",
+    }
+    wanted = {"cell", "at", "n_points", "clearance_m", "joint_margin_rad", "feasible", "violations"} | means
+    assert wanted <= set(data)
+    assert "profile" not in data
+    assert data["mmr_mean"] == report.mmr_mean
+    assert data["manipulability_mean"]["welder"] == report.manipulability_mean["welder"]
+
+
+def test_json_holds_the_profile_on_request(report: Report):
+    data = report.to_json(profile=True)
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert data["profile"]["mmr"] == report.profile["mmr"].tolist()
+
+
+def test_placement_without_a_plan(cell):
+    report = unreachable(cell, (0.5, 0.1, 1.0), "welder", 18, 72)
+    assert not report.feasible
+    assert math.isnan(report.mmr_mean)
+    assert report.violations[0].constraint == "reach"
+    data = json.loads(json.dumps(report.to_json(), allow_nan=False))
+    assert data["mmr_mean"] is None
+    assert data["manipulability_min"] == {"handler_1": None, "handler_2": None, "welder": None}
+    assert {k: data["violations"][0][k] for k in ("constraint", "robot", "point", "value", "s")} == {
+        "constraint": "reach", "robot": "welder", "point": 18, "value": None, "s": 0.25,
+    }  # fmt: skip
+    assert "reach welder at point 18" in str(report)
+
+
+def test_no_plan_is_never_feasible(cell):
+    assert not Report.without_plan(cell, (0, 0, 0), 72, []).feasible
+
+
+def test_one_violation_for_each_robot_and_joint_the_worst_first():
+    got = worst_first(
+        [violation(1.2), violation(1.5), violation(1.1), violation(1.9, "welder"), violation(1.3, joint="J6")]
+    )
+    assert [(v.robot, v.joint, v.value) for v in got] == [
+        ("welder", "J4", 1.9),
+        ("handler_1", "J4", 1.5),
+        ("handler_1", "J6", 1.3),
+    ]
+
+
+def test_broken_without_measure_comes_first():
+    reach = Violation("reach", "welder", 1, math.nan, math.nan)
+    assert worst_first([violation(9.0), reach])[0] is reach
+
+
+@pytest.mark.parametrize("count", [0, 1, 30])
+def test_text_fits_a_terminal(cell, report: Report, count):
+    pairs = [f"handler_{i}.forearm - welder.torch_body" for i in range(count)]
+    violations = [Violation("clearance", "x", 71, -0.123456, 0.01, s=0.99, pair=pair, unit="m") for pair in pairs]
+    data = {name: getattr(report, name) for name in report.__dataclass_fields__}
+    text = str(Report(**{**data, "violations": worst_first(violations), "feasible": not count}))
+    assert max(len(line) for line in text.splitlines()) <= 80
+    assert text.count("clearance handler_") == min(count, SHOWN)
+    assert ("and 22 more" in text) == (count == 30)
+    assert "0.284151" in text
+    assert ("NOT feasible" in text) == (count > 0)
+
+
+def test_violation_text_names_joint_point_and_units():
+    assert str(violation(1.25)) == "joint_limit handler_1 J4 at point 7 (s 0.1000): 1.25 rad, limit 1"
