@@ -7,11 +7,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from nlpweld.cell.checked import Checked, Name, NonNegative, Positive, Sourced, Vector
+from nlpweld.cell.complaint import nearest
 from nlpweld.cell.robot import Body, Robot
 from nlpweld.cell.task import Coupling, Posture, Saddle, Tee, Tool
 
 READINGS = ("paper", "equal", "harmonic", "sqrt_tight", "millimetres")
 Reading = Literal["paper", "equal", "harmonic", "sqrt_tight", "millimetres"]
+RESERVED = ("main_pipe", "branch", "floor")
 
 
 class Station(Sourced):
@@ -23,6 +25,16 @@ class Station(Sourced):
     base_position_m: Vector
     base_rpy_deg: Vector = (0.0, 0.0, 0.0)
     coupling: Coupling
+
+    @model_validator(mode="after")
+    def _bodies_are_told_apart(self) -> "Station":
+        names = [body.name for body in self.bodies]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two bodies of robot and tool are named '{name}'; rename one")
+            if name in RESERVED:
+                raise ValueError(f"body '{name}' is named like the workpiece or the floor; rename it")
+        return self
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -85,7 +97,7 @@ class Cell(Checked):
     configuration: Configuration
     constraints: Constraints
     objective: Objective
-    placements: dict[str, Vector] = {}
+    placements: Annotated[dict[str, Vector], Field(default_factory=dict)]
 
     @model_validator(mode="after")
     def _names_are_told_apart(self) -> "Cell":
@@ -110,7 +122,8 @@ class Cell(Checked):
             known = {f"{b.name}/{w}" for b in station.bodies for w in works}
             for pair in station.coupling.may_touch:
                 if pair not in known:
-                    raise ValueError(f"stations.{station.name}.coupling.may_touch: no pair '{pair}'; there are {sorted(known)}")
+                    where = f"stations.{station.name}.coupling.may_touch"
+                    raise ValueError(f"{where}: no pair '{pair}'; {nearest(pair, known)}")
         return self
 
     @model_validator(mode="after")
@@ -121,7 +134,7 @@ class Cell(Checked):
                 for end in (body.start, body.end):
                     if end.frame != "tcp" and int(end.frame[4:]) > n:
                         raise ValueError(
-                            f"tool body '{body.name}' of '{station.name}' hangs on '{end.frame}'; the flange is link{n}"
+                            f"stations.{station.name}.tool: body '{body.name}' hangs on '{end.frame}'; the flange is link{n}"
                         )
         return self
 

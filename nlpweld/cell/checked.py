@@ -2,13 +2,17 @@
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_+-]*$")]
+Source = Annotated[
+    Annotated[str, Tag("text")] | Annotated[dict[str, str], Tag("table")],
+    Discriminator(lambda value: "table" if isinstance(value, dict) else "text"),
+]
 
 
 class Checked(BaseModel):
@@ -24,7 +28,7 @@ class Sourced(Checked):
         source: one text for the whole table, or a table with one text for every numeric field.
     """
 
-    source: str | dict[str, str]
+    source: Source
 
     @model_validator(mode="after")
     def _every_number_has_a_source(self) -> "Sourced":

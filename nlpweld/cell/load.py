@@ -1,6 +1,6 @@
 """Cell and robot files: found by name or path, read as TOML, checked, and turned into frozen types."""
 
-import difflib
+import os
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -10,7 +10,9 @@ from pydantic import ValidationError
 
 from nlpweld.cell.cell import Cell
 from nlpweld.cell.checked import Checked
+from nlpweld.cell.complaint import first_complaint, nearest
 from nlpweld.cell.robot import Robot
+from nlpweld.cell.task import Tool
 from nlpweld.errors import CellError
 
 Model = TypeVar("Model", bound=Checked)
@@ -30,11 +32,15 @@ def load_cell(name_or_path: str | Path) -> Cell:
     """
     path = find(name_or_path, "cells")
     data = read_toml(path)
-    tools = _table(data.pop("tools", {}), path, "tools")
-    for station in _stations(data, path):
-        where = f"stations.{station.get('name', '?')}"
+    tools = _tools(data.pop("tools", {}), path)
+    unused = set(tools)
+    for i, station in enumerate(_stations(data, path)):
+        where = f"stations.{station.get('name', i)}"
+        unused.discard(str(station.get("tool")))
         station["robot"] = _robot_data(station.get("robot"), path, where)
         station["tool"] = _named(tools, station.get("tool"), path, f"{where}.tool")
+    for name in sorted(unused):
+        raise CellError(f"{path}: tools.{name}: no station uses it; remove it or name it in a station")
     data.setdefault("name", path.stem)
     return checked(Cell, data, path)
 
@@ -56,17 +62,13 @@ def find(name_or_path: str | Path, kind: str, beside: Path | None = None) -> Pat
         CellError: neither a file nor a built-in name; lists the names there are.
     """
     text = str(name_or_path)
-    if not text.endswith(".toml") and "/" not in text:
-        built_in = LIBRARY / kind / f"{text}.toml"
-        if built_in.is_file():
-            return built_in
-    for path in (Path(text), beside.parent / text if beside else Path(text)):
-        if path.is_file():
-            return path
     names = library_names(kind)
-    close = difflib.get_close_matches(text, names, n=1)
-    hint = f"did you mean '{close[0]}'?" if close else f"built in are {', '.join(names)}"
-    raise CellError(f"{text}: no such file and no built-in {kind[:-1]} of that name; {hint}")
+    if text in names:
+        return LIBRARY / kind / f"{text}.toml"
+    for path in (Path(text), beside.parent / text if beside else Path(text)):
+        if os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises where a name is too long
+            return path
+    raise CellError(f"{text}: no such file and no built-in {kind[:-1]} of that name; {nearest(text, names)}")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -83,8 +85,14 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise CellError(f"{path}: not TOML: {error}; mend the syntax there") from None
 
 
-def checked(model: type[Model], data: dict[str, Any], path: Path) -> Model:
+def checked(model: type[Model], data: Any, path: Path, where: str = "") -> Model:
     """Build a model from plain data, strictly.
+
+    Args:
+        model: what to build.
+        data: a table of the file.
+        path: the file, for the message.
+        where: which table of the file it is; empty for the whole.
 
     Raises:
         CellError: a field is missing, unknown, of the wrong kind, or contradicts another.
@@ -92,38 +100,14 @@ def checked(model: type[Model], data: dict[str, Any], path: Path) -> Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise CellError(f"{path}: {first_complaint(error, model)}") from None
+        raise CellError(f"{path}: {first_complaint(error, data, where)}") from None
 
 
-def first_complaint(error: ValidationError, model: type[Checked]) -> str:
-    """Return the most telling complaint as ``field: what; mend``, with a count of the others."""
-    complaints = sorted(error.errors(), key=lambda e: e["type"] == "missing")  # a misspelt name explains a missing one
-    first = complaints[0]
-    tags = {"tee", "saddle", "tight", "loose", "flat"}
-    where = ".".join(str(part) for part in first["loc"] if part not in tags and "function-" not in str(part))
-    others = f" (+{len(complaints) - 1} more)" if len(complaints) > 1 else ""
-    missing = [str(e["loc"][-1]) for e in complaints if e["type"] == "missing"]
-    return f"{where or 'the file'}: {_mend(first, missing)}{others}"
-
-
-def _mend(complaint: Any, missing: list[str]) -> str:
-    """Say what is wrong with one field and how to mend it."""
-    name = str(complaint["loc"][-1]) if complaint["loc"] else ""
-    if complaint["type"] == "missing":
-        return "missing; add it"
-    if complaint["type"] == "extra_forbidden":
-        close = difflib.get_close_matches(name, missing, n=1)
-        return f"unknown field; did you mean '{close[0]}'?" if close else "unknown field; remove it or mend its name"
-    if complaint["type"] == "value_error":
-        return str(complaint["ctx"]["error"])
-    got = complaint["input"]
-    shown = "" if isinstance(got, dict | list) else f", got {got!r}"
-    return f"{complaint['msg'][0].lower()}{complaint['msg'][1:]}{shown}; mend the value"
-
-
-def _table(value: Any, path: Path, where: str) -> dict[str, Any]:
+def _tools(value: Any, path: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise CellError(f"{path}: {where}: not a table; write [{where}.NAME]")
+        raise CellError(f"{path}: tools: not a table; write [tools.NAME]")
+    for name, tool in value.items():
+        checked(Tool, tool, path, f"tools.{name}")
     return value
 
 
@@ -147,6 +131,8 @@ def _robot_data(name: Any, path: Path, where: str) -> dict[str, Any]:
 
 
 def _named(tools: dict[str, Any], name: Any, path: Path, where: str) -> Any:
+    if not isinstance(name, str):
+        raise CellError(f"{path}: {where}: missing or not a name; {nearest('', tools)}")
     if name not in tools:
-        raise CellError(f"{path}: {where}: no tool '{name}'; there are {', '.join(sorted(tools)) or 'none'}")
+        raise CellError(f"{path}: {where}: no tool '{name}'; {nearest(name, tools)}")
     return tools[name]

@@ -37,7 +37,7 @@ class End(Checked):
     ``frame`` is ``link0`` (the base) to ``linkN`` (the flange), or ``tcp``.
     """
 
-    frame: Annotated[str, Field(pattern=r"^(link\d+|tcp)$")]
+    frame: Annotated[str, Field(pattern=r"^(link(0|[1-9]\d*)|tcp)$")]
     at_m: Vector = (0.0, 0.0, 0.0)
 
 

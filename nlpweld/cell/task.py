@@ -95,9 +95,10 @@ class Grasp(Sourced):
 
     @model_validator(mode="after")
     def _reference_is_not_along_the_approach(self) -> "Grasp":
-        with np.errstate(invalid="ignore", divide="ignore"):
-            finite = np.isfinite(self.T_C_E).all()
-        if not finite:
+        a, e = np.radians(self.azimuth_deg), np.radians(self.elevation_deg)
+        approach = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        reference = np.array(self.x_reference)
+        if np.linalg.norm(np.cross(approach, reference)) <= 1e-6 * np.linalg.norm(reference):
             raise ValueError("x_reference is parallel to the approach direction; choose another")
         return self
 

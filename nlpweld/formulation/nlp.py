@@ -78,10 +78,7 @@ class Nlp:
     n_modes: int = 1
 
     def starts(self, seed: int, count: int) -> np.ndarray:
-        """Return start points in the box, shape (count, n): one uniformly random, more as a scrambled Sobol set."""
-        rng = np.random.default_rng(seed)
-        if count == 1:
-            return rng.uniform(self.lower, self.upper, (1, len(self.lower)))
+        """Return start points in the box from a scrambled Sobol sequence, shape (count, n)."""
         power = int(np.ceil(np.log2(count)))
-        unit = qmc.Sobol(len(self.lower), rng=rng).random_base2(power)[:count]
+        unit = qmc.Sobol(len(self.lower), rng=np.random.default_rng(seed)).random_base2(power)[:count]
         return qmc.scale(unit, self.lower, self.upper)

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -24,7 +25,8 @@ class Ipopt:
         settled: relative gain in objective below which a feasible answer is final.
         hopeless: total violation after the third solve above which a descent is given up.
         descents: random starts at most.
-        modes_tried: discrete choices followed from a start, the most promising first.
+        modes_tried: where there are discrete choices, how many are followed, the most promising first.
+        scouts: random candidates of the exact model that rank the discrete choices.
         tol: Ipopt's tolerance.
         max_iter: Ipopt's iterations per solve.
     """
@@ -35,9 +37,12 @@ class Ipopt:
     settled: float = 1e-4
     hopeless: float = 1e-3
     descents: int = 10
-    modes_tried: int = 1
+    modes_tried: int = 3
+    scouts: int = 512
     tol: float = 1e-6
     max_iter: int = 100
+
+    PRESETS: ClassVar[dict[str, dict[str, object]]] = {"default": {}}
 
     def unsuitable(self, nlp: Nlp) -> str | None:
         """Return why this solver cannot take the problem, or None when it can."""
@@ -47,19 +52,29 @@ class Ipopt:
         """Descend from random starts in the box until one ends feasible."""
         search = Incumbent(nlp)
         run = _Run(nlp, self, search, budget)
-        for k, start in enumerate(nlp.starts(seed, self.descents)):
-            for mode in self._promising_modes(search, start):
+        tried = 0
+        for group in self._starts(search, seed):
+            for start, mode in group:
+                tried += 1
                 run.descend(start, mode)
-            if search.total == 0.0 or run.stopped:
+                if run.stopped:
+                    return search.outcome(run.build_s, f"time limit in descent {tried}", timeout=True)
+            if search.total == 0.0:
                 break
-        message = f"{run.last}; start {k + 1} of {self.descents}, {run.iterations} iterations"
-        return search.outcome(run.build_s, message, timeout=run.stopped and search.total > 0.0)
+        return search.outcome(run.build_s, f"{run.last}; {tried} descents, {run.iterations} iterations")
 
-    def _promising_modes(self, search: Incumbent, start: np.ndarray) -> list[int]:
-        """Return the discrete choices to follow from a start."""
-        if search.nlp.n_modes == 1:
-            return [0]
-        return search.nlp.rank_modes(start)[: self.modes_tried]
+    def _starts(self, search: Incumbent, seed: int) -> list[list[tuple[np.ndarray, int]]]:
+        """Return groups of (start, mode); a group is followed whole, the next only if it brought nothing feasible."""
+        nlp = search.nlp
+        if nlp.n_modes == 1:
+            return [[(start, 0)] for start in nlp.starts(seed, self.descents)]
+        X = nlp.starts(seed, self.scouts)
+        found = search.evaluate(X)
+        order = np.lexsort((-found.objective, found.total))
+        first = {int(found.mode[i]): X[i] for i in order[::-1]}  # the best scout of each mode
+        ranked = list(dict.fromkeys(int(found.mode[i]) for i in order))
+        starts = [(first[mode], mode) for mode in ranked]
+        return [starts[: self.modes_tried], *([s] for s in starts[self.modes_tried : self.descents])]
 
 
 @dataclass(eq=False)
@@ -74,7 +89,7 @@ class _Run:
     iterations: int = 0
     last: str = ""
     stopped: bool = False
-    built: dict[int, tuple[ca.Function, "_Watch"]] = field(default_factory=dict)
+    built: dict[int, tuple[ca.Function, "_Watch"]] = field(default_factory=dict)  # nlpsol only borrows the watch
 
     def descend(self, start: np.ndarray, mode: int) -> None:
         """Solve with growing sharpness from one start on one mode."""
@@ -92,7 +107,8 @@ class _Run:
             if self.search.out_of(self.budget):
                 self.stopped = True
                 return
-            if k >= 2 and (found.total[0] > self.options.hopeless or found.feasible[0] and gain < self.options.settled * abs(before)):
+            settled = found.feasible[0] and gain < self.options.settled * abs(before)
+            if k >= 2 and (settled or found.total[0] > self.options.hopeless):
                 return
 
     def _solver(self, mode: int) -> tuple[ca.Function, "_Watch"]:

@@ -12,6 +12,8 @@ from nlpweld.verify.measures import Measures, measure
 from nlpweld.verify.report import Report, Violation, worst_first
 from nlpweld.verify.scene import Scene, look
 
+LARGEST = 1e9  # [m] or [rad]; beyond it squares overflow and cosines mean nothing
+
 
 def verify(plan: Plan) -> Report:
     """Compute everything about a plan again and hold it against its cell's exact levels, along the whole seam.
@@ -103,12 +105,12 @@ def _refuse_wrong_shapes(plan: Plan) -> None:
 def _not_finite(plan: Plan) -> list[Violation]:
     """Return what holds NaN or infinity: no comparison with it can be believed."""
     found, nan = [], math.nan
-    if not np.isfinite(plan.placement_m).all():
-        found.append(Violation("finite", None, None, nan, nan, note="the placement holds NaN or infinity"))
+    if not (np.abs(plan.placement_m) < LARGEST).all():
+        found.append(Violation("finite", None, None, nan, nan, note="the placement holds NaN or infinity, or nearly"))
     for name, path in plan.paths.items():
-        bad = np.argwhere(~np.isfinite(path))
+        bad = np.argwhere(~(np.abs(path) < LARGEST))
         if len(bad):
             point, joint, s = int(bad[0][0]), f"J{bad[0][1] + 1}", float(plan.s[bad[0][0]])
-            text = "the path holds NaN or infinity"
+            text = "the path holds NaN or infinity, or nearly"
             found.append(Violation("finite", name, point, nan, nan, s=s, joint=joint, note=text))
     return found

@@ -16,6 +16,8 @@ SCALE = {
     ("closure", "rad"): 1e-3,
     ("continuity", "rad"): 0.1,
     ("continuity", "m"): 0.01,
+    ("branch", "m"): 0.1,
+    ("branch", ""): 0.1,
     ("joint_limit", "rad"): 0.1,
     ("singularity", "m^3"): 0.02,
     ("clearance", "m"): 0.02,
@@ -70,7 +72,8 @@ class Violation:
         who = " ".join(part for part in (self.pair or self.robot, self.joint) if part)
         where = "" if self.point is None else f" at point {self.point}"
         where += "" if self.s is None else f" (s {self.s:.4f})"
-        numbers = f": {self.value:.6g} {self.unit}, limit {self.limit:.6g}" if math.isfinite(self.value) else ""
+        unit = f" {self.unit}" if self.unit else ""
+        numbers = f": {self.value:.6g}{unit}, limit {self.limit:.6g}" if math.isfinite(self.value) else ""
         return f"{self.constraint} {who}{where}{numbers}{'; ' + self.note if self.note else ''}"
 
 

@@ -11,6 +11,8 @@ from nlpweld.verify.between import close_chain
 from nlpweld.verify.check import verify
 from nlpweld.verify.report import Report
 
+from .helpers import cell_with, changed
+
 AT = np.array([0.023, -0.266, 0.404])
 # The model's joint angles at the paper's placement and point 0, one wrist, in degrees.
 START_DEG = {
@@ -60,3 +62,9 @@ def report(plan: Plan) -> Report:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20240607)
+
+
+@pytest.fixture(scope="session")
+def coarse(plan: Plan) -> Plan:
+    cell = cell_with(plan.cell, seam={"points": 6})
+    return changed(plan, cell=cell, s=np.arange(6) / 6, paths={name: q[::12] for name, q in plan.paths.items()})

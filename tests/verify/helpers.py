@@ -7,6 +7,10 @@ import numpy as np
 
 from nlpweld.cell import Cell
 from nlpweld.plan import Plan
+from nlpweld.verify.report import Report, Violation
+
+ROBOTS = ("handler_1", "handler_2", "welder")
+BRANCH = dict.fromkeys(ROBOTS, ("front", "up", "noflip"))
 
 
 def changed(plan: Plan, **fields: Any) -> Plan:
@@ -35,3 +39,13 @@ def with_limits(cell: Cell, name: str, joint: int, **limits: float) -> Cell:
             station = station.model_copy(update={"robot": robot})
         stations.append(station)
     return cell.model_copy(update={"stations": tuple(stations)})
+
+
+def found(report: Report, constraint: str) -> list[Violation]:
+    assert not report.feasible
+    return [v for v in report.violations if v.constraint == constraint]
+
+
+def only(report: Report, constraint: str) -> list[Violation]:
+    assert {v.constraint for v in report.violations} == {constraint}, str(report)
+    return found(report, constraint)

@@ -75,6 +75,16 @@ def test_zero_flange_is_where_the_robot_file_says(robot: Robot, cell: Cell):
     np.testing.assert_allclose(ref.link_poses(station, np.zeros((1, 6)))[0, -1, :3, 3], robot.zero_flange_m, atol=1e-12)
 
 
+def test_tcp_is_where_the_tool_puts_it(cell: Cell, rng):
+    for station in cell.stations:
+        T_W_L = ref.link_poses(station, random_q(rng, station.robot, 20))
+        T_W_E = ref.tcp_pose(station, T_W_L)
+        along = np.einsum("mi,mi->m", T_W_E[:, :3, 3] - T_W_L[:, -1, :3, 3], T_W_L[:, -1, :3, 2])
+        np.testing.assert_allclose(along, station.tool.translation_m[2])
+        angle = Rotation.from_matrix(T_W_L[:, -1, :3, :3].swapaxes(1, 2) @ T_W_E[:, :3, :3]).magnitude()
+        np.testing.assert_allclose(np.degrees(angle), abs(station.tool.rpy_deg[1]), atol=1e-6)
+
+
 def test_torch_neck_bends_after_the_translation(cell: Cell):
     np.testing.assert_allclose(
         ref.tool_pose(cell.stations[2]), shift(0, 0, 0.4) @ turn("y", np.radians(22)), atol=1e-15
