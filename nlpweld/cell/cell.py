@@ -133,8 +133,9 @@ class Cell(Checked):
             for body in station.tool.bodies:
                 for end in (body.start, body.end):
                     if end.frame != "tcp" and int(end.frame[4:]) > n:
+                        where = f"stations.{station.name}.tool"
                         raise ValueError(
-                            f"stations.{station.name}.tool: body '{body.name}' hangs on '{end.frame}'; the flange is link{n}"
+                            f"{where}: body '{body.name}' hangs on '{end.frame}'; the flange is link{n}"
                         )
         return self
 

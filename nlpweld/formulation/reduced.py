@@ -21,14 +21,14 @@ class OutOfReach:
     """Why a placement has no joint paths.
 
     Attributes:
+        cell: the cell.
         station: name of the robot that cannot reach.
         point: the worst seam point.
-        miss: the squared sine of the elbow's opening there, negative.
     """
 
+    cell: Cell
     station: str
     point: int
-    miss: float
 
 
 def reduced(cell: Cell) -> Nlp:
@@ -61,7 +61,7 @@ class Unpacker:
             shoulder, elbow = self.batch.modes[mode][k]
             cos_sin, reach = self._solve(k, x, (shoulder, elbow))
             if reach.min() < 0.0:
-                return OutOfReach(station.name, int(reach.argmin()), float(reach.min()))
+                return OutOfReach(cell, station.name, int(reach.argmin()))
             q = joint_paths(station.robot, list(cos_sin[:, None, :]))
             wrists = allowed(cell.configuration.wrist, WRIST)
             need = np.radians(cell.constraints.joint_margin_deg)
