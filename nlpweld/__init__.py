@@ -1,1 +1,70 @@
-"""nlpweld."""
+"""nlpweld: where the workpiece goes and how every robot moves, for robots that weld one part together.
+
+A cell file goes in, a verified plan and a row of a results table come out. The names below are the public
+interface; they load what they need when first used, so that importing nlpweld is quick.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nlpweld.bench.answer import Answer, evaluate, formulate, solve
+    from nlpweld.bench.compare import compare
+    from nlpweld.cell import Cell, load_cell, load_robot
+    from nlpweld.errors import NlpweldError
+    from nlpweld.formulation.reduced import reduced
+    from nlpweld.plan import Plan, load_plan
+    from nlpweld.solvers import Budget, solver_names
+    from nlpweld.verify import Report
+    from nlpweld.verify import verify as verify_plan
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "Answer": "bench.answer",
+    "Budget": "solvers",
+    "Cell": "cell",
+    "NlpweldError": "errors",
+    "Plan": "plan",
+    "Report": "verify",
+    "compare": "bench.compare",
+    "evaluate": "bench.answer",
+    "formulate": "bench.answer",
+    "load_cell": "cell",
+    "load_plan": "plan",
+    "load_robot": "cell",
+    "reduced": "formulation.reduced",
+    "solve": "bench.answer",
+    "solver_names": "solvers",
+    "verify_plan": "verify",
+}
+
+__all__ = [
+    "Answer",
+    "Budget",
+    "Cell",
+    "NlpweldError",
+    "Plan",
+    "Report",
+    "compare",
+    "evaluate",
+    "formulate",
+    "load_cell",
+    "load_plan",
+    "load_robot",
+    "reduced",
+    "solve",
+    "solver_names",
+    "verify_plan",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home on first use (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'nlpweld' has no attribute '{name}'")
+    home = importlib.import_module(f"nlpweld.{_HOMES[name]}")
+    # the package nlpweld.verify keeps its own name, so its function goes by another here
+    value = getattr(home, "verify" if name == "verify_plan" else name)
+    globals()[name] = value
+    return value

@@ -1,7 +1,6 @@
 """A plan: where the workpiece goes and how every joint moves along the seam; saved as plain JSON."""
 
 import json
-import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,7 +90,9 @@ def _plan_from(data: dict[str, Any]) -> Plan:
         raise ValueError("s: not at least three increasing numbers in [0, 1)")
     for st in cell.stations:
         if paths[st.name].shape != (len(s), len(st.robot.joints)):
-            raise ValueError(f"paths_rad.{st.name}: not one row of {len(st.robot.joints)} joints for each of {len(s)} points")
+            raise ValueError(
+                f"paths_rad.{st.name}: not one row of {len(st.robot.joints)} joints for each of {len(s)} points"
+            )
     branches = data.get("branches")
     return Plan(cell, placement, s, paths, branches and {k: (b[0], b[1], b[2]) for k, b in branches.items()})
 
@@ -116,8 +117,8 @@ def write_text(path: str | Path, text: str) -> Path:
         with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False, encoding="utf-8") as file:
             temporary = file.name
             file.write(text)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
     except OSError as error:
         if temporary:
             Path(temporary).unlink(missing_ok=True)

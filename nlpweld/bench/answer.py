@@ -54,7 +54,7 @@ def with_branches(cell: Cell, branches: str | None) -> Cell:
     Raises:
         OptionError: neither of the two.
     """
-    choices = {
+    choices: dict[str, dict[str, object]] = {
         "front": {"shoulder": "front", "elbow": "up", "wrist": "any"},
         "any": {"shoulder": "any", "elbow": "any", "wrist": "any"},
     }
@@ -90,7 +90,15 @@ def evaluate_plan(nlp: Nlp, x: np.ndarray, mode: int | None = None) -> tuple[Pla
     return plan, verify(plan)
 
 
-def solve(nlp: Nlp, solver: str = "ipopt", *, seed: int = 0, budget: Budget | None = None, preset: str = "default", **options: Any) -> Answer:
+def solve(
+    nlp: Nlp,
+    solver: str = "ipopt",
+    *,
+    seed: int = 0,
+    budget: Budget | None = None,
+    preset: str = "default",
+    **options: Any,
+) -> Answer:
     """Solve a problem and verify the answer.
 
     Args:

@@ -17,7 +17,9 @@ from nlpweld.cell.cell import Cell
 from nlpweld.solvers import Budget, make_solver
 
 GRACE_S = 30.0  # on top of a task's time budget: start-up, verification
-SINGLE_THREADED = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+SINGLE_THREADED = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
 Progress = Callable[[dict[str, Any], bool], None]
 
 
@@ -51,7 +53,9 @@ def grid(
     ]
 
 
-def run(tasks: Sequence[Task], folder: Path, workers: int = 1, progress: Progress | None = None) -> list[dict[str, Any]]:
+def run(
+    tasks: Sequence[Task], folder: Path, workers: int = 1, progress: Progress | None = None
+) -> list[dict[str, Any]]:
     """Run tasks that the folder does not hold yet and return all their records in the order of the tasks.
 
     Args:

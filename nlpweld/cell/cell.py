@@ -134,9 +134,7 @@ class Cell(Checked):
                 for end in (body.start, body.end):
                     if end.frame != "tcp" and int(end.frame[4:]) > n:
                         where = f"stations.{station.name}.tool"
-                        raise ValueError(
-                            f"{where}: body '{body.name}' hangs on '{end.frame}'; the flange is link{n}"
-                        )
+                        raise ValueError(f"{where}: body '{body.name}' hangs on '{end.frame}'; the flange is link{n}")
         return self
 
     def with_(self, **tables: dict[str, object]) -> "Cell":

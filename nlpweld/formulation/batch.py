@@ -143,7 +143,9 @@ class Batch:
     def _mmr(self, chosen: list[Side]) -> np.ndarray:
         tight = [s.coupling.kind == "tight" for s in self.cell.stations]
         with np.errstate(all="ignore"):  # a stretched or folded arm may give 0/0; such a candidate is infeasible
-            value = mmr(self.cell.objective.reading, [s.w for s in chosen], [s.gram for s in chosen], tight).mean(axis=1)
+            value = mmr(self.cell.objective.reading, [s.w for s in chosen], [s.gram for s in chosen], tight).mean(
+                axis=1
+            )
         return np.where(np.isfinite(value), value, -np.inf)
 
 

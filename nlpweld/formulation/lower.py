@@ -35,9 +35,11 @@ UNARY = {
     ca.OP_COS: "cos({0})",
     ca.OP_EXP: "exp({0})",
     ca.OP_LOG: "log({0})",
+    ca.OP_LOG1P: "log1p({0})",
     ca.OP_SIGN: "sign({0})",
 }
-NAMES = {name: getattr(np, name) for name in "minimum maximum where sqrt absolute arctan2 sin cos exp log sign".split()}
+FUNCTIONS = ("minimum", "maximum", "where", "sqrt", "absolute", "arctan2", "sin", "cos", "exp", "log", "log1p", "sign")
+NAMES = {name: getattr(np, name) for name in FUNCTIONS}
 Lowered = Callable[..., tuple[list[Any], ...]]
 
 

@@ -52,7 +52,9 @@ def limit_margins(robot: Robot, q: np.ndarray) -> np.ndarray:
     return np.minimum(upper - q.max(axis=-1), q.min(axis=-1) - lower)
 
 
-def on_best_wrist(robot: Robot, q: np.ndarray, wrists: Sequence[str], need: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def on_best_wrist(
+    robot: Robot, q: np.ndarray, wrists: Sequence[str], need: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Choose for each candidate the first allowed wrist that keeps a margin, or else the one that keeps most.
 
     Args:

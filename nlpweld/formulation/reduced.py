@@ -77,6 +77,8 @@ class Unpacker:
     def _solve(self, k: int, x: np.ndarray, branch: tuple[str, str]) -> tuple[np.ndarray, np.ndarray]:
         """Return cosines and sines (12, N) and reach (N,) of station k by the CasADi graph itself."""
         n = self._points.shape[1]
-        out = self.batch.stage.arms[k].map(n)(np.repeat(np.reshape(x, (3, 1)), n, axis=1), self._points, np.array([signs((*branch, "noflip"))] * n).T)
+        out = self.batch.stage.arms[k].map(n)(
+            np.repeat(np.reshape(x, (3, 1)), n, axis=1), self._points, np.array([signs((*branch, "noflip"))] * n).T
+        )
         cos_sin = np.array(out[0]).reshape(6, n, 2).transpose(2, 0, 1).reshape(12, n)
         return cos_sin, np.array(out[3]).ravel()

@@ -41,7 +41,7 @@ def _summed(name: str, inputs: list[ca.SX], output: ca.SX, data: ca.DM) -> ca.Fu
     one = ca.Function(name, inputs, [output], {"cse": True})
     x, sharpness = ca.MX.sym("x", 3), ca.MX.sym("sharpness")
     columns = one.map(n)(ca.repmat(x, 1, n), data, ca.repmat(sharpness, 1, n))
-    rows, width = output.shape
+    width = output.shape[1]
     total = ca.horzcat(*[ca.sum2(columns[:, k::width]) for k in range(width)])
     return ca.Function(name, [x, sharpness], [total], ["x", "sharpness"], [name])
 
@@ -60,11 +60,13 @@ def _term(stage: Stage, mode: tuple[Branch, ...], x: ca.SX, point: ca.SX, sharpn
     return -value / n + ca.sum1(_softplus(-sharpness * ca.vertcat(*constraints))) / sharpness
 
 
-def _robot_constraints(cell: Cell, k: int, arm: list[ca.SX]) -> list[ca.SX]:
+def _robot_constraints(cell: Cell, k: int, arm: tuple[ca.SX, ...]) -> list[ca.SX]:
     limits = cell.constraints
     floor = limits.singularity_floor_m3 + limits.singularity_margin_m3
     cos_sin, w, _, reach = arm[:4]
-    joints = joint_constraints(cell.stations[k].robot, cos_sin[:, 0], cos_sin[:, 1], np.radians(limits.joint_margin_deg))
+    joints = joint_constraints(
+        cell.stations[k].robot, cos_sin[:, 0], cos_sin[:, 1], np.radians(limits.joint_margin_deg)
+    )
     return [reach, w / (floor or 1.0) - float(floor > 0), *joints]
 
 

@@ -14,10 +14,11 @@ import numpy as np
 
 from nlpweld.cell.cell import Cell, Station
 from nlpweld.cell.robot import Body
-from nlpweld.formulation.coupling import WeldPoint, base_pose, flange_pose, weld_point
+from nlpweld.errors import KinematicsError
+from nlpweld.formulation.coupling import base_pose, flange_pose, weld_point
 from nlpweld.geometry.capsules import segment_distance
 from nlpweld.kinematics.chain import Chain, Frame, constant, jacobian_of, rpy_pose
-from nlpweld.kinematics.ik import spherical_arm
+from nlpweld.kinematics.ik import SphericalArm, spherical_arm
 from nlpweld.kinematics.manipulability import det_gram
 
 ARM_OUTPUTS = ("cos_sin", "w", "gram", "reach", "ends", "gaps")
@@ -74,7 +75,7 @@ class Stage:
     def _arm(self, station: Station) -> ca.Function:
         x, point, branch = ca.SX.sym("x", 3), weld_point(), ca.SX.sym("branch", 3)
         T_W_C = Frame(point.R_W_C, x)
-        arm = spherical_arm(station.robot)
+        arm = self._inverse(station)
         found = arm.solve(flange_pose(station, T_W_C, point.p_C), branch)
         links = Chain(station.robot).links(found.cos, found.sin, base_pose(station))
         tcp = links[-1] @ constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
@@ -94,6 +95,12 @@ class Stage:
         ]
         inputs = [x, point.vector, branch]
         return _function(f"arm_{station.name}", inputs, outputs, ["x", "point", "branch"], list(ARM_OUTPUTS))
+
+    def _inverse(self, station: Station) -> SphericalArm:
+        try:
+            return spherical_arm(station.robot)
+        except KinematicsError as error:
+            raise KinematicsError(f"{self.cell.name}: stations.{station.name}: {error}") from None
 
     def _solo_pairs(self, station: Station) -> list[tuple[str, str, str]]:
         """Return (name, body, other) of every distance that concerns one robot alone."""
@@ -144,7 +151,13 @@ def sq_length(station: Station, body: Body) -> float:
 def workpiece_rods(cell: Cell, T_W_C: Frame) -> list[Rod]:
     """Return the workpiece's bodies as rods in W."""
     return [
-        Rod(b.name, T_W_C.point(b.start_m), T_W_C.point(b.end_m), b.radius_m, float(np.sum(np.subtract(b.end_m, b.start_m) ** 2)))
+        Rod(
+            b.name,
+            T_W_C.point(b.start_m),
+            T_W_C.point(b.end_m),
+            b.radius_m,
+            float(np.sum(np.subtract(b.end_m, b.start_m) ** 2)),
+        )
         for b in cell.workpiece.bodies
     ]
 

@@ -42,11 +42,12 @@ def make_solver(name: str, preset: str = "default", **options: Any) -> Solver:
     cls = _solver_class(name)
     _known(preset, cls.PRESETS, f"solver '{name}': preset")
     chosen = {**cls.PRESETS[preset], **options}
-    names = {f.name: type(f.default) for f in fields(cls)}
+    kinds = {f.name: type(f.default) for f in fields(cls)}
     for option, value in chosen.items():
-        _known(option, names, f"solver '{name}': option")
-        if not isinstance(value, int if names[option] is int else (int, float) if names[option] is float else names[option]):
-            raise OptionError(f"solver '{name}': option '{option}' wants {names[option].__name__}, got {value!r}; mend it")
+        _known(option, kinds, f"solver '{name}': option")
+        kind = kinds[option]
+        if type(value) is not kind and not (kind is float and type(value) is int):
+            raise OptionError(f"solver '{name}': option '{option}' wants {kind.__name__}, got {value!r}; mend it")
     return cls(**chosen)
 
 
@@ -61,4 +62,4 @@ def _known(name: str, names: Any, what: str) -> None:
     if name not in names:
         close = difflib.get_close_matches(name, list(names), n=1)
         hint = f"did you mean '{close[0]}'? " if close else ""
-        raise OptionError(f"{what} '{name}' is unknown; {hint}There are: {', '.join(sorted(names))}")
+        raise OptionError(f"{what} '{name}' is unknown; {hint}there are: {', '.join(sorted(names))}")

@@ -118,4 +118,6 @@ class Incumbent:
         status: Status = "TIMEOUT" if timeout else "SOLVED" if feasible else "INFEASIBLE"
         objective = self.objective if np.isfinite(self.objective) else float("nan")
         solve_s = self.elapsed_s - build_s
-        return Outcome(status, self.x, self.mode, objective, self.evaluations, build_s, solve_s, tuple(self.trace), message)
+        return Outcome(
+            status, self.x, self.mode, objective, self.evaluations, build_s, solve_s, tuple(self.trace), message
+        )

@@ -1,0 +1,36 @@
+# Two commands do all the set-up: `make reproduce` for the main job, `make test` for the tests.
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin/python
+# no compiler, no licence: everything comes as wheels, at the versions in constraints.txt
+INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+
+.PHONY: reproduce test lint clean
+
+reproduce: $(VENV)/.stamp-main
+	$(RUN) experiments/reproduce_paper.py
+
+test: $(VENV)/.stamp-test
+	$(RUN) -m pytest
+
+lint: $(VENV)/.stamp-lint
+	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
+	$(RUN) -m mypy
+	$(VENV)/bin/lint-imports
+
+$(VENV)/.stamp-main: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(INSTALL) --editable .
+	touch $@
+
+$(VENV)/.stamp-test: $(VENV)/.stamp-main
+	$(INSTALL) --editable '.[test]'
+	touch $@
+
+$(VENV)/.stamp-lint: $(VENV)/.stamp-main
+	$(INSTALL) --editable '.[test,lint]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

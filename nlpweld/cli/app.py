@@ -1,0 +1,120 @@
+"""The commands and their options; what they do is in the modules beside this one."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nlpweld.cli import ask, look
+
+app = typer.Typer(
+    help="Place a workpiece among cooperating welding robots, and plan every joint; each answer is verified.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    add_completion=False,
+)
+
+CellName = Annotated[str, typer.Argument(metavar="CELL", help="a built-in cell or the path of a TOML file")]
+Json = Annotated[bool, typer.Option("--json", help="print one JSON object and nothing else")]
+Branches = Annotated[
+    str | None, typer.Option(metavar="front|any", help="inverse kinematics branches; the cell's own by default")
+]
+Reading = Annotated[str | None, typer.Option(metavar="NAME", help="reading of eq. (16); the cell's own by default")]
+Points = Annotated[int | None, typer.Option(help="seam points; the cell's own by default")]
+Formulation = Annotated[str, typer.Option(metavar="NAME", help="how the problem is written down")]
+TimeLimit = Annotated[float | None, typer.Option(min=0.0, help="time limit of a run [s]")]
+Evaluations = Annotated[int | None, typer.Option(min=1, help="limit on candidates of the exact model")]
+
+
+@app.command()
+def cells(json: Json = False) -> None:
+    """List the built-in cells, robots and solvers."""
+    look.cells(json)
+
+
+@app.command()
+def show(cell: CellName, json: Json = False) -> None:
+    """Show a cell's numbers and where each comes from."""
+    look.show(cell, json)
+
+
+@app.command()
+def evaluate(
+    cell: CellName,
+    at: Annotated[
+        tuple[float, float, float] | None, typer.Option(metavar="X Y Z", help="origin of the workpiece in W [m]")
+    ] = None,
+    placement: Annotated[
+        str | None, typer.Option(metavar="NAME", help="a placement named in the cell file, instead of --at")
+    ] = None,
+    branches: Branches = None,
+    reading: Reading = None,
+    points: Points = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="keep the plan of this placement")] = None,
+    json: Json = False,
+) -> int:
+    """Verify one placement along the whole seam."""
+    return ask.evaluate(ask.variant(cell, branches, reading, points), at, placement, out, json)
+
+
+@app.command()
+def solve(
+    cell: CellName,
+    solver: Annotated[str, typer.Option(metavar="NAME", help="NAME or NAME:PRESET; see 'nlpweld cells'")] = "ipopt",
+    formulation: Formulation = "reduced",
+    seed: Annotated[int, typer.Option(min=0, help="seed of every random draw")] = 0,
+    time_limit: TimeLimit = None,
+    evaluations: Evaluations = None,
+    branches: Branches = None,
+    reading: Reading = None,
+    points: Points = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="keep the plan as DIR/plan.json")] = None,
+    json: Json = False,
+) -> int:
+    """Find the best placement with one solver, and verify it."""
+    asked = ask.Question(
+        ask.variant(cell, branches, reading, points), solver, formulation, seed, time_limit, evaluations
+    )
+    return ask.solve(asked, out, json)
+
+
+@app.command()
+def verify(plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a plan file")], json: Json = False) -> int:
+    """Check a plan along the whole seam, apart from whatever made it."""
+    return ask.verify(plan, json)
+
+
+@app.command()
+def compare(
+    cells: Annotated[list[str], typer.Argument(metavar="CELL...", help="built-in cells or TOML files")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="folder of the study; what it holds is not run again")],
+    solvers: Annotated[
+        str, typer.Option(metavar="A,B,...", help="solvers, each NAME or NAME:PRESET")
+    ] = "ipopt,ga,random_search",
+    seeds: Annotated[int, typer.Option(min=1, help="seeds 0 to K-1")] = 5,
+    workers: Annotated[int, typer.Option(min=1, help="runs at once; use 1 for runtime tables")] = 1,
+    formulation: Formulation = "reduced",
+    time_limit: TimeLimit = None,
+    evaluations: Evaluations = None,
+    branches: Branches = None,
+    reading: Reading = None,
+    points: Points = None,
+    json: Json = False,
+) -> int:
+    """Run solvers over seeds on cells, verify every answer, and tabulate."""
+    variants = [ask.variant(name, branches, reading, points) for name in cells]
+    asked = [ask.Question(cell, solvers, formulation, seeds, time_limit, evaluations) for cell in variants]
+    return look.compare(asked, out, workers, json)
+
+
+@app.command()
+def tables(folder: Annotated[Path, typer.Argument(metavar="DIR")], json: Json = False) -> None:
+    """Write the tables of a study from its stored records."""
+    look.tables(folder, json)
+
+
+@app.command()
+def plots(folder: Annotated[Path, typer.Argument(metavar="DIR")], json: Json = False) -> None:
+    """Draw the figures of a study from its stored records."""
+    look.plots(folder, json)

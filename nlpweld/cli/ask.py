@@ -1,0 +1,174 @@
+"""Commands that ask one question of one cell: evaluate, solve, verify."""
+
+import json as json_
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+from rich.console import Console
+
+from nlpweld.cell import READINGS, Cell, load_cell
+from nlpweld.errors import OptionError, OutputError
+from nlpweld.plan import Plan, load_plan
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a run is to answer, as typed."""
+
+    cell: Cell
+    solver: str
+    formulation: str
+    seed: int
+    time_limit_s: float | None
+    evaluations: int | None
+
+
+def variant(name: str, branches: str | None, reading: str | None, points: int | None) -> Cell:
+    """Load a cell and apply the options that change it.
+
+    Raises:
+        CellError: the cell cannot be loaded.
+        OptionError: an option's value is not one of those there are.
+    """
+    from nlpweld.bench.answer import with_branches
+
+    cell = with_branches(load_cell(name), branches)
+    if reading is not None:
+        if reading not in READINGS:
+            raise OptionError(f"--reading '{reading}' is unknown. There are: {', '.join(READINGS)}")
+        cell = cell.with_(objective={"reading": reading})
+    if points is not None:
+        try:
+            cell = cell.with_(seam={"points": points})
+        except ValidationError as error:
+            raise OptionError(f"--points {points}: {error.errors()[0]['msg'].lower()}") from None
+    return cell
+
+
+def evaluate(
+    cell: Cell, at: tuple[float, float, float] | None, placement: str | None, out: Path | None, json: bool
+) -> int:
+    """Print the report of one placement; 0 when feasible, 1 when not."""
+    from nlpweld.bench.answer import evaluate_plan, formulate
+
+    x = np.array(_where(cell, at, placement))
+    if out is not None:
+        writable(out.parent)
+    plan, report = evaluate_plan(formulate(cell), x)
+    if plan is not None and out is not None:
+        plan.save(out)
+    if json:
+        print(json_.dumps({**report.to_json(), **_start(plan)}))
+    else:
+        print(report)
+        if plan is not None and out is not None:
+            print(f"plan: {out}")
+    return 0 if report.feasible else 1
+
+
+def solve(asked: Question, out: Path | None, json: bool) -> int:
+    """Solve, verify and print; 0 when verified, 1 when not."""
+    from nlpweld.bench.answer import formulate
+    from nlpweld.bench.answer import solve as solve_
+    from nlpweld.solvers import Budget
+
+    if out is not None:
+        writable(out)
+    name, _, preset = asked.solver.partition(":")
+    nlp = formulate(asked.cell, asked.formulation)
+    with _busy(f"{asked.solver} on {asked.cell.name}, seed {asked.seed}", quiet=json) as tell:
+
+        def counted(X: np.ndarray, inner: Any = nlp.evaluate) -> Any:
+            tell(len(X))
+            return inner(X)
+
+        budget = Budget(asked.evaluations, asked.time_limit_s)
+        watched = replace(nlp, evaluate=counted)
+        answer = solve_(watched, name, seed=asked.seed, budget=budget, preset=preset or "default")
+    plan_path = answer.plan.save(out / "plan.json") if answer.plan is not None and out is not None else None
+    outcome, report = answer.outcome, answer.report
+    facts = {
+        "solver": asked.solver,
+        "formulation": asked.formulation,
+        "seed": asked.seed,
+        "status": outcome.status,
+        "message": outcome.message,
+        "placement": None if outcome.x is None else outcome.x.tolist(),
+        "evaluations": outcome.evaluations,
+        "build_s": round(outcome.build_s, 4),
+        "solve_s": round(outcome.solve_s, 4),
+        "verified": answer.verified,
+        "plan": plan_path and str(plan_path),
+    }
+    if json:
+        print(json_.dumps({**(report.to_json() if report else {"cell": asked.cell.name}), **facts}))
+    else:
+        print(f"{asked.solver}, seed {asked.seed}: {outcome.status} ({outcome.message})")
+        print(f"  {outcome.evaluations} evaluations, build {outcome.build_s:.2f} s, solve {outcome.solve_s:.2f} s")
+        print(report or "no answer to verify")
+        print(f"plan: {plan_path}" if plan_path else "add --out DIR to keep the plan")
+    return 0 if answer.verified else 1
+
+
+def verify(path: Path, json: bool) -> int:
+    """Print the report of a plan file; 0 when feasible, 1 when not."""
+    from nlpweld.verify.check import verify as verify_
+
+    plan = load_plan(path)
+    with _busy("verifying", quiet=json):
+        report = verify_(plan)
+    print(json_.dumps(report.to_json()) if json else report)
+    return 0 if report.feasible else 1
+
+
+def writable(folder: Path) -> None:
+    """Refuse a folder in which nothing can be written, before any work is done.
+
+    Raises:
+        OutputError: names the folder or the file in the way.
+    """
+    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if not existing.is_dir():
+        raise OutputError(f"{existing}: is a file, not a folder; choose another --out")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise OutputError(f"{existing}: cannot be written (permission denied); choose another --out")
+
+
+def _where(cell: Cell, at: tuple[float, float, float] | None, placement: str | None) -> tuple[float, float, float]:
+    if (at is None) == (placement is None):
+        raise OptionError("give either --at X Y Z or --placement NAME")
+    if at is not None:
+        return at
+    if placement not in cell.placements:
+        raise OptionError(
+            f"--placement '{placement}' is not in the cell. There are: {', '.join(cell.placements) or 'none'}"
+        )
+    return cell.placements[placement]
+
+
+def _start(plan: Plan | None) -> dict[str, Any]:
+    """Return branches and joint angles at the first seam point, for JSON."""
+    if plan is None:
+        return {"branches": None, "joints_start_deg": None}
+    start = {name: np.degrees(q[0]).tolist() for name, q in plan.paths.items()}
+    return {"branches": plan.branches, "joints_start_deg": start}
+
+
+@contextmanager
+def _busy(what: str, quiet: bool) -> Iterator[Any]:
+    """Show on standard error that work is going on, with the count of candidates told."""
+    console, count = Console(stderr=True, quiet=quiet), 0
+    with console.status(what) as status:
+
+        def tell(more: int) -> None:
+            nonlocal count
+            count += more
+            status.update(f"{what}: {count:,} candidates")
+
+        yield tell
