@@ -17,6 +17,7 @@ from nlpweld.cell.cell import Cell
 from nlpweld.solvers import Budget, make_solver
 
 GRACE_S = 30.0  # on top of a task's time budget: start-up, verification
+WORKER = [sys.executable, "-m", "nlpweld.bench.worker"]
 SINGLE_THREADED = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
@@ -93,10 +94,10 @@ def run_apart(task: Task) -> dict[str, Any]:
     """Run one task in a process of its own and return its record."""
     limit = None if task.budget.time_s is None else task.budget.time_s + GRACE_S
     began = time.perf_counter()
-    command = [sys.executable, "-m", "nlpweld.bench.worker"]
+
     try:
         done = subprocess.run(
-            command,
+            WORKER,
             input=json.dumps(task.to_json()),
             capture_output=True,
             text=True,

@@ -153,10 +153,10 @@ def _where(cell: Cell, at: tuple[float, float, float] | None, placement: str | N
 
 
 def _start(plan: Plan | None) -> dict[str, Any]:
-    """Return branches and joint angles at the first seam point, for JSON."""
+    """Return branches and, as principal values, the joint angles (DH) at the first seam point, for JSON."""
     if plan is None:
         return {"branches": None, "joints_start_deg": None}
-    start = {name: np.degrees(q[0]).tolist() for name, q in plan.paths.items()}
+    start = {name: (180 - (180 - np.degrees(q[0])) % 360).tolist() for name, q in plan.paths.items()}
     return {"branches": plan.branches, "joints_start_deg": start}
 
 

@@ -103,7 +103,7 @@ def compare(asked: list[Question], out: Path, workers: int, json: bool) -> int:
     if json:
         print(json_.dumps({"out": str(out), "runs": len(records), "verified": sum(r["verified"] for r in records)}))
     else:
-        print(format_summary(summary))
+        Console().print(format_summary(summary))
         print(f"records and tables: {out}")
     return 0 if any(r["verified"] for r in records) else 1
 
@@ -125,7 +125,10 @@ def tables(folder: Path, json: bool) -> None:
     from nlpweld.report.tables import format_summary, write_tables
 
     summary = write_tables(folder)
-    print(summary.to_json(orient="records") if json else format_summary(summary))
+    if json:
+        print(summary.to_json(orient="records"))
+    else:
+        Console().print(format_summary(summary))
 
 
 def plots(folder: Path, json: bool) -> None:

@@ -28,8 +28,7 @@ class Ga:
         mutation_eta: distribution index of the polynomial mutation.
         mean_change: mean fitness change that counts as still; 0 never stops early.
         still: how many still generations end the run.
-        infeasible: ``violation`` ranks infeasible individuals by how far they miss; ``eliminate`` drops them, as
-            Pan et al. write.
+        eliminate: drop infeasible individuals, as Pan et al. write, instead of ranking them by how far they miss.
     """
 
     population: int = 50
@@ -39,9 +38,9 @@ class Ga:
     mutation_eta: float = 20.0
     mean_change: float = 0.0
     still: int = 5
-    infeasible: str = "violation"
+    eliminate: bool = False
 
-    PRESETS: ClassVar[dict[str, dict[str, object]]] = {"default": {}, "paper": {"infeasible": "eliminate"}}
+    PRESETS: ClassVar[dict[str, dict[str, object]]] = {"default": {}, "paper": {"eliminate": True}}
 
     def unsuitable(self, nlp: Nlp) -> str | None:
         """Return why this solver cannot take the problem, or None when it can."""
@@ -57,5 +56,5 @@ class Ga:
         )
         build_s = time.perf_counter() - search.started
         stop = Stop(self.generations, self.mean_change, self.still)
-        why = evolve(algorithm, search, seed, budget, stop, eliminate=self.infeasible == "eliminate")
+        why = evolve(algorithm, search, seed, budget, stop, eliminate=self.eliminate)
         return search.outcome(build_s, why, timeout=why == "time limit")

@@ -1,0 +1,1 @@
+"""Tables and figures from stored records and data alone; no solver has to be installed."""

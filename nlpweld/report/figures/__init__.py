@@ -1,0 +1,25 @@
+"""Families of figures, one module each; a module's ``drawings(study)`` lists what it can draw and from what."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from nlpweld.report.study import Study
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """One figure to be.
+
+    Attributes:
+        name: file name without ending.
+        draw: makes the figure from the study.
+        needs: files below the study's folder that it reads beside the records.
+    """
+
+    name: str
+    draw: "Callable[[Study], Figure]"
+    needs: tuple[str, ...] = ()

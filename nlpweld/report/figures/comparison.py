@@ -1,0 +1,131 @@
+"""Solvers side by side, from records alone: quality, time, and progress."""
+
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from nlpweld.report import style
+from nlpweld.report.figures import Drawing
+from nlpweld.report.study import Study
+
+SPREAD = 0.13  # half width of the jitter that tells runs of one solver apart
+
+
+def drawings(study: Study) -> list[Drawing]:
+    """Return one set of figures for each cell."""
+    kinds = {"mmr_by_solver": mmr_by_solver, "solve_time_by_solver": solve_time_by_solver, "progress": progress}
+    cells = study.runs["cell"].unique()
+    return [Drawing(f"{kind}-{cell}", partial(draw, cell=cell)) for cell in cells for kind, draw in kinds.items()]
+
+
+def labelled(table: pd.DataFrame, cell: str) -> pd.DataFrame:
+    """Return the rows of one cell with a ``label`` that names solver, preset, and formulation where several are there."""
+    own = table[table["cell"] == cell].copy()
+    preset = own["preset"].where(own["preset"] != "default", "")
+    own["label"] = own["solver"] + preset.map(lambda p: f":{p}" if p else "")
+    if own["formulation"].nunique() > 1:
+        own["label"] += "\n" + own["formulation"]
+    return own
+
+
+def mmr_by_solver(study: Study, cell: str) -> Figure:
+    """Draw mean MMR of every run that brought numbers, verified or not, by solver."""
+    runs = labelled(study.runs, cell)
+    fig = style.figure(58)
+    axes = fig.add_subplot()
+    labels = sorted(runs["label"].unique())
+    for i, label in enumerate(labels):
+        _strip(axes, i, runs[runs["label"] == label], "mmr_mean", style.SERIES[i % len(style.SERIES)])
+    _reference(axes, study.baselines, cell)
+    _solver_axis(axes, runs, labels)
+    style.name_axes(axes, "solver (verified of runs)", "mean MMR along the seam [mixed m$^6$, m$^3$]", cell)
+    _legend_of_marks(axes, bool((~runs["verified"] & runs["mmr_mean"].notna()).any()))
+    return fig
+
+
+def solve_time_by_solver(study: Study, cell: str) -> Figure:
+    """Draw the solve time of every run that ended by itself, on a logarithmic axis."""
+    runs = labelled(study.runs, cell)
+    fig = style.figure(58)
+    axes = fig.add_subplot()
+    axes.set_yscale("log")
+    labels = sorted(runs["label"].unique())
+    for i, label in enumerate(labels):
+        ended = runs[(runs["label"] == label) & ~runs["status"].isin(["FAILED", "SKIPPED"]) & (runs["solve_s"] > 0)]
+        _strip(axes, i, ended, "solve_s", style.SERIES[i % len(style.SERIES)])
+    _solver_axis(axes, runs, labels)
+    style.name_axes(axes, "solver (verified of runs)", "time to solve, without build [s]", cell)
+    _legend_of_marks(axes, not runs["verified"].all())
+    return fig
+
+
+def progress(study: Study, cell: str) -> Figure:
+    """Draw the best MMR so far against evaluations of the model: median and range over seeds."""
+    traces = labelled(study.traces, cell)
+    fig = style.figure(64)
+    axes = fig.add_subplot()
+    axes.set_xscale("log")
+    for i, (label, steps) in enumerate(traces.groupby("label")):
+        grid, best = best_so_far(steps)
+        colour = style.SERIES[i % len(style.SERIES)]
+        middle, low, high = _range(best)
+        axes.fill_between(grid, low, high, color=colour, alpha=0.18, linewidth=0, step="post")
+        axes.step(grid, middle, where="post", color=colour, ls=style.LINES[i % len(style.LINES)], label=label)
+    _reference(axes, study.baselines, cell)
+    style.name_axes(axes, "evaluations", "best MMR so far [mixed m$^6$, m$^3$]", f"{cell}: median and range of seeds")
+    style.legend_below(axes, 3)
+    return fig
+
+
+def best_so_far(steps: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Return a grid of evaluations (g,) and the best value of each seed there, shape (seeds, g); NaN before the first."""
+    grid = np.unique(steps["evaluations"].to_numpy())
+    rows = []
+    for _, run in steps.groupby("seed"):
+        at = np.searchsorted(run["evaluations"].to_numpy(), grid, side="right") - 1
+        best = run["best"].cummax().ffill().to_numpy()
+        rows.append(np.where(at >= 0, best[np.maximum(at, 0)], np.nan))
+    return grid, np.array(rows)
+
+
+def _range(best: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return median, least and greatest over the seeds, only where more than half of them have a feasible point."""
+    enough = 2 * np.isfinite(best).sum(axis=0) > len(best)
+    result = np.full((3, best.shape[1]), np.nan)
+    result[:, enough] = [f(best[:, enough], axis=0) for f in (np.nanmedian, np.nanmin, np.nanmax)]
+    return result[0], result[1], result[2]
+
+
+def _strip(axes: Axes, place: int, runs: pd.DataFrame, column: str, colour: str) -> None:
+    """Draw one solver's runs side by side, unverified ones as crosses, and the median of the verified."""
+    offsets = np.linspace(-SPREAD, SPREAD, len(runs)) if len(runs) > 1 else np.zeros(len(runs))
+    good = runs["verified"].to_numpy(dtype=bool)
+    x, y = place + offsets, runs[column].to_numpy(dtype=float)
+    axes.scatter(x[good], y[good], s=13, color=colour, edgecolor=style.INK, linewidth=0.3, zorder=3)
+    axes.scatter(x[~good], y[~good], s=16, color=style.RED, marker="x", linewidth=1.0, zorder=4)
+    if good.any():
+        axes.hlines(np.median(y[good]), place - 0.3, place + 0.3, color=style.INK, linewidth=1.1, zorder=2)
+
+
+def _solver_axis(axes: Axes, runs: pd.DataFrame, labels: list[str]) -> None:
+    counts = runs.groupby("label")["verified"].agg(["sum", "size"])
+    names = [f"{label.replace('_', ' ')}\n({counts.loc[label, 'sum']}/{counts.loc[label, 'size']})" for label in labels]
+    axes.set_xticks(range(len(labels)), names)
+    axes.set_xlim(-0.6, len(labels) - 0.4)
+    axes.grid(axis="x", visible=False)
+
+
+def _reference(axes: Axes, baselines: pd.DataFrame, cell: str) -> None:
+    for _, row in baselines[(baselines["cell"] == cell) & baselines["feasible"].astype(bool)].iterrows():
+        axes.axhline(row["mmr_mean"], color=style.INK, linestyle=":", linewidth=1.0, label=row["name"])
+
+
+def _legend_of_marks(axes: Axes, unverified: bool) -> None:
+    axes.scatter([], [], s=13, color=style.GREY, edgecolor=style.INK, linewidth=0.3, label="verified run")
+    if unverified:
+        axes.scatter([], [], s=16, color=style.RED, marker="x", linewidth=1.0, label="not verified")
+    axes.plot([], [], color=style.INK, linewidth=1.1, label="median of verified")
+    style.legend_below(axes, 2)

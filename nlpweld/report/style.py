@@ -1,0 +1,84 @@
+"""How every figure looks: printed 85 mm wide, readable in grey and by colour-blind eyes."""
+
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+WIDTH_IN = 85 / 25.4
+DPI = 200
+
+# Okabe and Ito's palette, in an order whose greys differ; robots also differ by line style.
+BLUE, ORANGE, GREEN, RED, SKY, PURPLE, YELLOW = (
+    "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#F0E442",
+)  # fmt: skip
+GREY, INK = "#8C8C8C", "#222222"
+SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED)
+LINES = ("-", "--", "-.", (0, (1, 1.2)), (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)))
+MARKERS = ("o", "s", "^", "D", "v", "P")
+
+RC: dict[str, Any] = {
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7,
+    "legend.frameon": True,
+    "legend.framealpha": 0.85,
+    "legend.edgecolor": "none",
+    "legend.handlelength": 2.4,
+    "legend.borderpad": 0.3,
+    "legend.labelspacing": 0.3,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#DDDDDD",
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.3,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "figure.dpi": DPI,
+    "savefig.dpi": DPI,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "nlpweld",
+}
+
+
+def figure(height_mm: float = 60.0) -> Figure:
+    """Return an empty figure, 85 mm wide; tight_layout and the like are not needed."""
+    return Figure(figsize=(WIDTH_IN, height_mm / 25.4), layout="constrained")
+
+
+def space(fig: Figure, elevation: float = 22.0, azimuth: float = -60.0, **where: Any) -> Any:
+    """Return 3-D axes with equal scales, metres and a light grid."""
+    axes: Any = fig.add_subplot(projection="3d", **where)
+    axes.view_init(elevation, azimuth)
+    axes.tick_params(pad=-2, labelsize=6.5)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.pane.set_alpha(0.0)
+        axis.labelpad = -4
+    return axes
+
+
+def name_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
+    """Label both axes, units included, and set a title."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    if title:
+        axes.set_title(title, loc="left")
+
+
+def legend_below(axes: Axes, columns: int, **options: Any) -> None:
+    """Put the legend under the axes, where it hides nothing."""
+    fig = axes.figure
+    handles, labels = axes.get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=columns, **options)  # type: ignore[union-attr]
+
+
+def pretty(robot: str) -> str:
+    """Return a station's name for people."""
+    return robot.replace("_", " ")

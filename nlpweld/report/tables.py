@@ -1,0 +1,183 @@
+"""The results table: one row for each cell, formulation, solver and preset, and one for each baseline."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from rich.markup import escape
+from rich.table import Table
+
+from nlpweld.plan import write_text
+from nlpweld.report.records import AXES, load_baselines, load_records
+
+GROUP = ["cell", "formulation", "solver", "preset"]
+HEADINGS = {
+    "runs": "runs", "claimed": "solved", "verified": "verified", "mmr": "MMR mean ± sd", "mmr_best": "best",
+    "mmr_share_percent": "% of best", "evaluations_median": "evals", "build_median_s": "build s",
+    "solve_median_s": "solve s", "to_reference_mm": "to C mm",
+}  # fmt: skip
+FORMATS = {
+    "runs": "{:.0f}", "claimed": "{:.0f}", "verified": "{:.0f}", "mmr_best": "{:.5f}", "mmr_share_percent": "{:.2f}",
+    "evaluations_median": "{:.0f}", "build_median_s": "{:.2f}", "solve_median_s": "{:.2f}", "to_reference_mm": "{:.1f}",
+}  # fmt: skip
+NARROW = {
+    "verified": "veri-\nfied", "MMR mean ± sd": "MMR\nmean ± sd", "% of best": "% of\nbest", "evals": "evals\nmedian",
+    "build s": "build\n[s]", "solve s": "solve\n[s]", "to C mm": "to C\n[mm]",
+}  # fmt: skip
+SMALLEST_SPREAD = 1e-5  # what five decimals can show
+COUNTS = ("runs", "claimed", "verified", "failed")
+LATEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "±": r"$\pm$", "<": r"$<$"} | {
+    c: f"\\{c}" for c in "&%$#_{}"
+}
+
+
+def write_tables(folder: str | Path) -> pd.DataFrame:
+    """Write ``tables/summary.{csv,tex,md}`` and ``tables/runs.csv`` of a study and return the summary.
+
+    Args:
+        folder: the study's folder, with ``records/`` and perhaps ``baselines/`` below it.
+
+    Raises:
+        OptionError: the folder holds no records.
+        OutputError: a record is broken, or the tables cannot be written.
+    """
+    folder = Path(folder)
+    runs = load_records(folder)
+    table = summary(runs, load_baselines(folder))
+    tables = folder / "tables"
+    write_text(tables / "runs.csv", runs.to_csv(index=False))
+    write_text(tables / "summary.csv", table.to_csv(index=False))
+    write_text(tables / "summary.tex", to_latex(table))
+    write_text(tables / "summary.md", to_markdown(table))
+    return table
+
+
+def summary(runs: pd.DataFrame, baselines: pd.DataFrame) -> pd.DataFrame:
+    """Return the summary of runs and baselines.
+
+    Mean, spread, best, share and distance are over verified runs alone; medians are over all runs that came to an
+    end by themselves. ``mmr_share_percent`` is the mean as a share of the best verified MMR in the same cell;
+    ``to_reference_mm`` the distance of the row's best placement from the cell's first baseline (the paper's C).
+
+    Args:
+        runs: as from :func:`nlpweld.report.records.load_records`.
+        baselines: as from :func:`nlpweld.report.records.load_baselines`.
+    """
+    rows = [{**dict(zip(GROUP, key, strict=True)), **_solver_row(group)} for key, group in runs.groupby(GROUP)]
+    rows += [_baseline_row(row) for _, row in baselines.iterrows()]
+    table = pd.DataFrame(rows)
+    best = table.groupby("cell")["mmr_best"].transform("max")
+    table["mmr_share_percent"] = 100 * table["mmr_mean"] / best
+    table["to_reference_mm"] = _distance_mm(table, baselines)
+    table = table.astype(dict.fromkeys(COUNTS, "Int64"))
+    order = [*GROUP, *("mmr_mean" if name == "mmr" else name for name in HEADINGS)]
+    order.insert(order.index("mmr_mean") + 1, "mmr_std")
+    order.insert(order.index("verified") + 1, "failed")
+    return table.sort_values("cell", kind="stable")[[*order, *AXES]].reset_index(drop=True)
+
+
+def format_summary(table: pd.DataFrame) -> Table:
+    """Return the summary as a rich table that fits 100 columns, with a section for each cell."""
+    text = _as_text(table)
+    shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+    for name in text.columns:
+        left = name == "solver"
+        shown.add_column(escape(NARROW.get(name, name)), justify="left" if left else "right", overflow="fold", no_wrap=not left)
+    previous = None
+    for cell, values in zip(table["cell"], text.to_numpy(), strict=True):
+        if cell != previous:
+            shown.add_row(escape(cell), style="bold cyan")
+        shown.add_row(escape(f"  {values[0]}"), *values[1:])
+        previous = cell
+    return shown
+
+
+def to_latex(table: pd.DataFrame) -> str:
+    """Return the summary as a LaTeX tabular with booktabs rules."""
+    text = _with_cells(table).map(_escaped)
+    text.columns = [_escaped(name) for name in text.columns]
+    style = text.style.hide(axis="index")
+    return style.to_latex(hrules=True, column_format="ll" + "r" * (len(text.columns) - 2))
+
+
+def to_markdown(table: pd.DataFrame) -> str:
+    """Return the summary as a Markdown table."""
+    text = _with_cells(table).map(lambda value: str(value).replace("|", "\\|"))
+    lines = [text.columns, ["---", "---", *["---:"] * (len(text.columns) - 2)], *text.to_numpy()]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def _solver_row(group: pd.DataFrame) -> dict[str, object]:
+    good = group[group["verified"] & group["mmr_mean"].notna()]
+    ended = group[~group["status"].isin(["FAILED", "SKIPPED"])]
+    row: dict[str, object] = {
+        "runs": len(group),
+        "claimed": int(group["claimed"].sum()),
+        "verified": len(good),
+        "failed": int((group["status"] == "FAILED").sum()),
+        "mmr_mean": good["mmr_mean"].mean(),
+        "mmr_std": good["mmr_mean"].std(),
+        "mmr_best": good["mmr_mean"].max(),
+        "evaluations_median": ended["evaluations"].median(),
+        "build_median_s": ended["build_s"].median(),
+        "solve_median_s": ended["solve_s"].median(),
+    }
+    best = good.loc[good["mmr_mean"].idxmax()] if len(good) else None
+    return row | {axis: np.nan if best is None else best[axis] for axis in AXES}
+
+
+def _baseline_row(baseline: pd.Series) -> dict[str, object]:
+    """Return a baseline's row; its MMR counts only if the verifier found it feasible."""
+    mmr = baseline["mmr_mean"] if baseline["feasible"] else np.nan
+    row = {"cell": baseline["cell"], "formulation": "", "solver": baseline["name"], "preset": ""}
+    row |= {"verified": int(baseline["feasible"]), "mmr_mean": mmr, "mmr_best": mmr}
+    return row | {axis: baseline[axis] for axis in AXES}
+
+
+def _distance_mm(table: pd.DataFrame, baselines: pd.DataFrame) -> np.ndarray:
+    """Return the distance of each row's best placement from the first baseline of its cell [mm], NaN without one."""
+    first = baselines.drop_duplicates("cell").set_index("cell")[list(AXES)].astype(float)
+    reference = first.reindex(table["cell"]).to_numpy()
+    return 1e3 * np.linalg.norm(table[list(AXES)].to_numpy(dtype=float) - reference, axis=1)
+
+
+def _as_text(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the summary as strings under the headings people read, blank where there is nothing to say."""
+    text = pd.DataFrame(index=table.index)
+    text["solver"] = [_label(row, table["formulation"]) for _, row in table.iterrows()]
+    for name, heading in HEADINGS.items():
+        values = _mean_and_spread(table) if name == "mmr" else [_shown(v, FORMATS[name]) for v in table[name]]
+        text[heading] = values
+    return text
+
+
+def _with_cells(table: pd.DataFrame) -> pd.DataFrame:
+    text = _as_text(table)
+    text.insert(0, "cell", table["cell"].astype(str))
+    return text
+
+
+def _label(row: pd.Series, formulations: pd.Series) -> str:
+    """Return ``solver``, ``solver:preset``, and the formulation where the table has several."""
+    label = row["solver"] if row["preset"] in ("", "default") else f"{row['solver']}:{row['preset']}"
+    several = formulations[formulations != ""].nunique() > 1
+    return f"{label} ({row['formulation']})" if several and row["formulation"] else label
+
+
+def _mean_and_spread(table: pd.DataFrame) -> list[str]:
+    pairs = zip(table["mmr_mean"], table["mmr_std"], strict=True)
+    return [_shown(m, "{:.5f}") + _spread(s) for m, s in pairs]
+
+
+def _spread(std: float) -> str:
+    if pd.isna(std):
+        return ""
+    return f" ± {std:.5f}" if std >= SMALLEST_SPREAD else " ± <1e-5"
+
+
+def _shown(value: float, form: str) -> str:
+    return "" if pd.isna(value) else form.format(value)
+
+
+def _escaped(text: object) -> str:
+    return "".join(LATEX.get(c, c) for c in str(text))
