@@ -22,7 +22,7 @@ def segment_distance(start_a: ca.SX, end_a: ca.SX, start_b: ca.SX, end_b: ca.SX,
     u, v, gap = end_a - start_a, end_b - start_b, start_a - start_b
     along, across, offset = ca.dot(u, v), ca.dot(u, gap), ca.dot(v, gap)
     a, b = max(sq_a, TINY), max(sq_b, TINY)
-    free = _clamp((along * offset - across * b) / ca.fmax(a * b - along**2, TINY))
+    free = _clamp((along * offset - across * b) / ca.fmax(a * b - along**2, TINY * a * b))
     t = _clamp((along * free + offset) / b)
     s = _clamp((along * t - across) / a)
     between = gap + s * u - t * v

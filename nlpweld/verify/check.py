@@ -43,7 +43,7 @@ def verify(plan: Plan) -> Report:
 
 def _report(plan: Plan, scene: Scene, measures: Measures, violations: tuple[Violation, ...]) -> Report:
     at = scene.motion.at
-    sample, pair = np.unravel_index(scene.clearance_m.argmin(), scene.clearance_m.shape)
+    point, pair = _closest(scene.clearance_m[at])
     x, y, z = (float(v) for v in plan.placement_m)
     return Report(
         cell=plan.cell.name,
@@ -58,9 +58,10 @@ def _report(plan: Plan, scene: Scene, measures: Measures, violations: tuple[Viol
         manipulability_mean={name: float(w[at].mean()) for name, w in scene.w.items()},
         manipulability_min={name: float(w[at].min()) for name, w in scene.w.items()},
         singularity_min={name: float(w.min()) for name, w in scene.w.items()},
-        clearance_m=float(scene.clearance_m[sample, pair]),
+        clearance_m=float(scene.clearance_m[at][point, pair]),
+        clearance_along_m=float(scene.clearance_m.min()),
         closest_pair=scene.table.pair_labels[pair],
-        closest_s=float(scene.motion.s[sample] % 1.0),
+        closest_s=float(plan.s[point]),
         joint_margin_rad=min(float(m.min()) for m in scene.joint_margin.values()),
         closure_m=max(float(e[0].max()) for e in scene.closure.values()),
         closure_rad=max(float(e[1].max()) for e in scene.closure.values()),
@@ -69,6 +70,12 @@ def _report(plan: Plan, scene: Scene, measures: Measures, violations: tuple[Viol
         violations=violations,
         profile=_profile(plan, scene, measures),
     )
+
+
+def _closest(clearance_m: np.ndarray) -> tuple[int, int]:
+    """Return point and pair of the least clearance (N, pairs); of equals within a nanometre, the first on the seam."""
+    point, pair = np.argwhere(clearance_m <= clearance_m.min() + 1e-9)[0]
+    return int(point), int(pair)
 
 
 def _profile(plan: Plan, scene: Scene, measures: Measures) -> dict[str, np.ndarray]:

@@ -81,8 +81,9 @@ class Violation:
 class Report:
     """Everything the checker found out about one plan or placement.
 
-    ``*_mean``, ``mmr_min`` and ``mmr_max`` are over the N points of the seam; ``manipulability_min`` too.
-    ``clearance_m``, ``joint_margin_rad`` and ``singularity_min`` are over the whole seam, between the points too.
+    ``*_mean``, ``mmr_min``, ``mmr_max``, ``manipulability_min`` and ``clearance_m`` are over the N points of the seam.
+    ``clearance_along_m``, ``joint_margin_rad`` and ``singularity_min`` are over the whole seam, between the points too;
+    these decide.
 
     Attributes:
         cell: name of the cell.
@@ -97,7 +98,8 @@ class Report:
         manipulability_mean: by station name [m^3].
         manipulability_min: by station name [m^3].
         singularity_min: by station name [m^3].
-        clearance_m: least distance of any pair looked at; negative is penetration.
+        clearance_m: least distance of any pair; negative is penetration.
+        clearance_along_m: the same along the whole seam.
         closest_pair: the two bodies of that pair.
         closest_s: where on the seam.
         joint_margin_rad: least distance of any joint from a limit; negative is beyond.
@@ -122,6 +124,7 @@ class Report:
     manipulability_min: dict[str, float]
     singularity_min: dict[str, float]
     clearance_m: float
+    clearance_along_m: float
     closest_pair: str | None
     closest_s: float | None
     joint_margin_rad: float
@@ -154,7 +157,7 @@ class Report:
             cell=cell.name, at=_triple(at), n_points=n_points, reading=cell.objective.reading,
             mmr_mean=nan, mmr_min=nan, mmr_max=nan, m_tight_mean=nan, m_loose_mean=nan,
             manipulability_mean=each, manipulability_min=dict(each), singularity_min=dict(each),
-            clearance_m=nan, closest_pair=None, closest_s=None, joint_margin_rad=nan, closure_m=nan, closure_rad=nan,
+            clearance_m=nan, clearance_along_m=nan, closest_pair=None, closest_s=None, joint_margin_rad=nan, closure_m=nan, closure_rad=nan,
             samples=0, feasible=False, violations=worst_first(violations),
         )  # fmt: skip
 
@@ -196,7 +199,8 @@ class Report:
             least, along = self.manipulability_min[name], self.singularity_min[name]
             lines.append(f"    {name:<15.15} {mean:<10.6f} {least:<17.6f} {along:.6f}")
         pair = "" if self.closest_pair is None else f", {self.closest_pair} at s {self.closest_s:.4f}"
-        clearance = f"  clearance         {1e3 * self.clearance_m:.3f} mm{pair}"
+        along = f"{1e3 * self.clearance_along_m:.3f} mm along the seam"
+        clearance = f"  clearance         {1e3 * self.clearance_m:.3f} mm{pair}; {along}"
         lines += textwrap.wrap(clearance, WIDTH, subsequent_indent=" " * 20)
         return [
             *lines,

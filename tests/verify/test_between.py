@@ -90,6 +90,6 @@ def test_finer_steps_move_no_margin(plan, report):
     """The cell's own claim about verify_step_m: halving it moves no margin by more than 1e-4 of its level."""
     fine = verify(changed(plan, cell=cell_with(plan.cell, constraints={"verify_step_m": 0.0025})))
     assert fine.samples > 1.5 * report.samples
-    assert abs(fine.clearance_m - report.clearance_m) < 1e-4 * plan.cell.constraints.clearance_m
+    assert abs(fine.clearance_along_m - report.clearance_along_m) < 1e-4 * plan.cell.constraints.clearance_m
     for name, w in report.singularity_min.items():
         assert abs(fine.singularity_min[name] - w) < 1e-4 * plan.cell.constraints.singularity_floor_m3

@@ -39,8 +39,8 @@ def test_closest_pair_is_a_forearm_and_the_torch(report: Report):
 
 
 def test_margins_are_looked_for_between_the_points(report: Report):
-    assert report.clearance_m == pytest.approx(0.0242114, abs=1e-6)
-    assert report.clearance_m < report.profile["clearance_m"].min()
+    assert report.clearance_along_m == pytest.approx(0.0242114, abs=1e-6)
+    assert report.clearance_along_m < report.profile["clearance_m"].min()
     assert report.singularity_min["handler_1"] == pytest.approx(0.123318, abs=1e-6)
     assert report.singularity_min["handler_1"] < report.manipulability_min["handler_1"]
 

@@ -49,7 +49,7 @@ def test_wrist_flipped_over_half_the_seam(plan: Plan, robot):
     path[36:, 4] *= -1
     report = verify(with_path(plan, robot, path))
     assert report.closure_m < 1e-9
-    assert report.clearance_m == pytest.approx(0.0242114, abs=1e-3)
+    assert report.clearance_along_m == pytest.approx(0.0242114, abs=1e-3)
     assert {v.robot for v in found(report, "continuity")} == {robot}
     assert {v.point for v in found(report, "continuity")} <= {35, 71}
     assert {(v.robot, v.joint) for v in found(report, "branch")} == {(robot, "J5")}

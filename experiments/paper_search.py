@@ -1,0 +1,117 @@
+"""Poor placements (Pan et al., Fig. 18 and 19) found by search, and maps over slices of the placement box S."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from scipy.stats import qmc
+
+from nlpweld.cell import Cell
+from nlpweld.formulation.batch import CONSTRAINTS, Batch
+from nlpweld.formulation.coupling import point_data
+from nlpweld.formulation.lower import lower
+from nlpweld.formulation.nlp import Nlp
+from nlpweld.geometry.seam import seam_parameters
+from nlpweld.kinematics.ik import signs
+from nlpweld.kinematics.manipulability import mmr
+from nlpweld.report.records import AXES
+
+Badness = Callable[[np.ndarray, np.ndarray], np.ndarray]
+ROUNDS, BROOD = 14, 64  # of the local search that follows the scan
+
+
+def without_floor(cell: Cell) -> Cell:
+    """Return the cell with no singularity floor, so that poor placements count as possible."""
+    return cell.with_(constraints={"singularity_floor_m3": 0.0, "singularity_margin_m3": 0.0})
+
+
+def near_singular(w: np.ndarray, _: np.ndarray) -> np.ndarray:
+    """Return how near the last robot stays to a singularity along the whole seam: minus its greatest w, shape (m,)."""
+    return -w[:, -1].max(axis=1)
+
+
+def unsteady(_: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Return the swing of MMR along the seam, shape (m,)."""
+    return np.ptp(value, axis=1)
+
+
+@dataclass(frozen=True)
+class Profiles:
+    """Manipulabilities and MMR at every seam point of many placements, on the first branches the cell allows."""
+
+    cell: Cell
+
+    @cached_property
+    def batch(self) -> Batch:
+        """The exact model over populations."""
+        return Batch(self.cell)
+
+    @cached_property
+    def _arms(self) -> list:
+        return [lower(arm) for arm in self.batch.stage.arms]
+
+    def __call__(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return w (m, robots, N) [m^3] and MMR (m, N) of placements X (m, 3) [m]."""
+        points = [row[None, :] for row in point_data(self.cell, seam_parameters(self.cell))]
+        found = [
+            arm([c[:, None] for c in X.T], points, signs((*branch, "noflip")))
+            for arm, branch in zip(self._arms, self.batch.modes[0], strict=True)
+        ]
+        shape = (len(X), points[0].shape[1])
+        w = [np.broadcast_to(out[1][0], shape) for out in found]
+        tight = [s.coupling.kind == "tight" for s in self.cell.stations]
+        return np.stack(w, axis=1), mmr(self.cell.objective.reading, w, [out[2][0] for out in found], tight)
+
+
+def worst_placement(profiles: Profiles, badness: Badness, scan: int, seed: int = 0) -> np.ndarray:
+    """Return the placement, reachable and inside the joint limits, that maximises a badness, shape (3,) [m].
+
+    A Sobol scan of S, then rounds of Gaussian steps that shrink around the best.
+
+    Args:
+        profiles: of the cell without its singularity floor.
+        badness: from w (m, robots, N) and MMR (m, N) to a value (m,).
+        scan: candidates of the scan, a power of two.
+        seed: seed of scan and steps.
+    """
+    low, high = profiles.cell.box
+    rng = np.random.default_rng(seed)
+    X = qmc.scale(qmc.Sobol(3, rng=rng).random(scan), low, high)
+    best, worst = X[0], -np.inf
+    for k in range(ROUNDS + 1):
+        values = np.where(_possible(profiles, X), badness(*profiles(X)), -np.inf)
+        if values.max() > worst:
+            best, worst = X[values.argmax()], values.max()
+        X = np.clip(best + 0.1 * 0.7**k * rng.standard_normal((BROOD, 3)), low, high)
+    return best
+
+
+def _possible(profiles: Profiles, X: np.ndarray) -> np.ndarray:
+    violation = profiles.batch.evaluate(X).violation
+    return (violation[:, [CONSTRAINTS.index("reach"), CONSTRAINTS.index("joint_limit")]] == 0.0).all(axis=1)
+
+
+def slice_map(nlp: Nlp, at: np.ndarray, axis: int, points: int) -> pd.DataFrame:
+    """Return MMR and the first constraint that fails over a slice of S.
+
+    Args:
+        nlp: the reduced form.
+        at: the point the slice goes through, shape (3,) [m].
+        axis: index of the coordinate that is held.
+        points: grid points along each of the other two.
+
+    Returns:
+        x_m, y_m, z_m, mmr, first_failing (``feasible`` where none fails), row by row.
+    """
+    grids = [np.linspace(lo, hi, points) for lo, hi in zip(nlp.lower, nlp.upper, strict=True)]
+    grids[axis] = at[[axis]]
+    X = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, 3)
+    found = nlp.evaluate(X)
+    failing = np.array([*nlp.constraints, "feasible"])
+    missed = np.column_stack([found.violation > 0.0, np.ones(len(X), dtype=bool)])
+    table = pd.DataFrame(X, columns=list(AXES))
+    table["mmr"] = np.where(np.isfinite(found.objective), found.objective, np.nan)
+    table["first_failing"] = failing[missed.argmax(axis=1)]
+    return table

@@ -1,0 +1,213 @@
+"""The study of Pan et al. from start to end: runs, verification, tables and figures.
+
+    python experiments/reproduce_paper.py --out results/paper
+
+What the folder already holds is not run again.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from paper_data import arm_table, ellipsoid_table, ga_individuals, ipopt_path, profile_table, seam_table, welder
+from paper_search import Profiles, near_singular, slice_map, unsteady, without_floor, worst_placement
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from nlpweld.bench.answer import evaluate_plan, with_branches
+from nlpweld.bench.run import grid, run
+from nlpweld.bench.task import Task
+from nlpweld.cell import Cell, load_cell
+from nlpweld.errors import NlpweldError
+from nlpweld.formulation.nlp import Nlp
+from nlpweld.formulation.reduced import reduced
+from nlpweld.plan import Plan, write_text
+from nlpweld.report.plots import write_plots
+from nlpweld.report.records import AXES
+from nlpweld.report.tables import format_summary, write_tables
+from nlpweld.solvers import Budget
+from nlpweld.verify import Report, verify
+
+CELL, ANY = "three_er16", "three_er16-any"
+PAPER = "Pan et al. C"
+ELLIPSOID_POINT = 0  # the seam point of Fig. 3
+Record = dict[str, Any]
+Step = tuple[str, Callable[[], None]]
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much of the study is done.
+
+    Attributes:
+        seeds: by solver (``any `` before those of the cell with all branches), how many.
+        evaluations: budget of each population run.
+        map_points: grid points along each side of a map.
+        scan: candidates of the scans for poor placements.
+    """
+
+    seeds: dict[str, int]
+    evaluations: int
+    map_points: int
+    scan: int
+
+
+FULL = Size({"ipopt": 20, "ga": 10, "ga:paper": 10, "random_search": 10, "any ipopt": 3, "any ga": 2}, 5000, 80, 4096)
+QUICK = Size({"ipopt": 1, "ga": 2, "ga:paper": 1, "random_search": 1, "any ga": 1}, 600, 12, 256)
+
+
+def tasks(cell: Cell, size: Size) -> list[Task]:
+    """Return the runs of the study."""
+    found: list[Task] = []
+    for name, seeds in size.seeds.items():
+        solver = name.removeprefix("any ")
+        budget = Budget(time_s=300.0, evaluations=None if solver == "ipopt" else size.evaluations)
+        own, label = (cell, CELL) if name == solver else (with_branches(cell, "any"), ANY)
+        found += grid([own], [solver], range(seeds), budget=budget, label=label)
+    return found
+
+
+@dataclass(frozen=True)
+class Data:
+    """What figures are drawn from, made step by step below the study's folder."""
+
+    folder: Path
+    cell: Cell
+    size: Size
+    records: list[Record]
+
+    def steps(self) -> Iterator[Step]:
+        """Yield name and work of every step."""
+        nlp, paper = reduced(self.cell), np.array(self.cell.placements["paper"])
+        best = self._best(CELL)
+        optimum = _placement(best)
+        yield "the paper's C", lambda: self._paper(nlp, paper, CELL)
+        yield "the paper's C, all branches", lambda: self._paper(reduced(with_branches(self.cell, "any")), paper, ANY)
+        yield "optimum", lambda: self._optimum(nlp, optimum)
+        yield "solvers' paths", lambda: self._paths(nlp, optimum)
+        for axis, name in enumerate(AXES):
+            yield f"map, {name[0]} held", lambda axis=axis: self._map(nlp, optimum, axis)
+        yield "poor placements", self._poor
+
+    def _best(self, label: str) -> Record:
+        good = [r for r in self.records if r["cell"] == label and r["verified"]]
+        if not good:
+            raise NlpweldError(f"{self.folder}: no run of {label} was verified; look at tables/runs.csv")
+        return max(good, key=lambda r: r["report"]["mmr_mean"])
+
+    def _paper(self, nlp: Nlp, at: np.ndarray, label: str) -> None:
+        plan, report = evaluate_plan(nlp, at)
+        stem = "paper" if label == CELL else "paper_any"
+        baseline = {"name": PAPER, "cell": label, "placement": at.tolist(), "report": report.to_json()}
+        write_text(self.folder / "baselines" / f"{stem}.json", json.dumps(baseline, indent=1) + "\n")
+        self._plan(stem, plan, report)
+        if label == CELL and plan:
+            self._csv("seam", seam_table(plan))
+
+    def _optimum(self, nlp: Nlp, at: np.ndarray) -> None:
+        plan, report = evaluate_plan(nlp, at)
+        self._plan("optimum", plan, report)
+        if plan:
+            self._csv("arms", arm_table(plan, ELLIPSOID_POINT))
+            self._csv("ellipsoids", ellipsoid_table(plan, ELLIPSOID_POINT))
+
+    def _paths(self, nlp: Nlp, optimum: np.ndarray) -> None:
+        own = [r for r in self.records if r["cell"] == CELL]
+        seed = median_seed([r for r in own if r["solver"] == "ga" and r["preset"] == "default"])
+        self._csv("ga_individuals", ga_individuals(nlp, seed, Budget(self.size.evaluations)).assign(seed=seed))
+        self._csv("ipopt_path", ipopt_path([r for r in own if r["solver"] == "ipopt"], optimum))
+
+    def _map(self, nlp: Nlp, optimum: np.ndarray, axis: int) -> None:
+        self._csv(f"map_{AXES[axis][0]}", slice_map(nlp, optimum, axis, self.size.map_points))
+
+    def _poor(self) -> None:
+        profiles = Profiles(without_floor(self.cell))
+        rows = []
+        for name, badness in {"near_singular": near_singular, "unsteady": unsteady}.items():
+            at = worst_placement(profiles, badness, self.size.scan)
+            plan, report = evaluate_plan(reduced(profiles.cell), at)
+            self._plan(name, plan, report)
+            rows.append({"name": name, **dict(zip(AXES, at, strict=True)), **self._verdict(plan, report)})
+        self._csv("poor_placements", pd.DataFrame(rows))
+
+    def _verdict(self, plan: Plan | None, report: Report) -> dict[str, Any]:
+        """Return a poor placement's numbers and what it breaks in the cell as it is, floor included."""
+        broken = verify(Plan(self.cell, plan.placement_m, plan.s, plan.paths, plan.branches)) if plan else report
+        w = report.profile[f"manipulability.{welder(self.cell).name}"]
+        numbers = {"mmr_mean": report.mmr_mean, "mmr_min": report.mmr_min, "mmr_max": report.mmr_max}
+        numbers |= {"w_welder_min_m3": w.min(), "w_welder_max_m3": w.max(), "clearance_m": report.clearance_m}
+        return numbers | {"breaks": ", ".join(dict.fromkeys(v.constraint for v in broken.violations)) or "nothing"}
+
+    def _plan(self, name: str, plan: Plan | None, report: Report) -> None:
+        if plan:
+            plan.save(self.folder / "plans" / f"{name}.json")
+            self._csv(f"profile_{name}", profile_table(report))
+
+    def _csv(self, name: str, table: pd.DataFrame) -> None:
+        write_text(self.folder / "data" / f"{name}.csv", table.to_csv(index=False, float_format="%.9g"))
+
+
+def _placement(record: Record) -> np.ndarray:
+    return np.array([record["placement"][name] for name in AXES])
+
+
+def median_seed(records: list[Record]) -> int:
+    """Return the seed of the run whose best MMR is the (lower) median of its kind."""
+    ranked = sorted(records, key=lambda r: (r.get("claimed_objective") or -np.inf, r["seed"]))
+    return int(ranked[(len(ranked) - 1) // 2]["seed"])
+
+
+def reproduce(folder: Path, workers: int, size: Size, console: Console) -> pd.DataFrame:
+    """Do the whole study in a folder and return the summary table."""
+    cell = load_cell(CELL)
+    todo = tasks(cell, size)
+    columns = (TextColumn("{task.description:<34}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console) as progress:
+        bar = progress.add_task("solving", total=len(todo))
+
+        def told(record: Record, known: bool) -> None:
+            what = f"{record['solver']}:{record['preset']} seed {record['seed']}"
+            progress.update(bar, advance=1, description=f"{what} {'known' if known else record['status']}")
+
+        records = run(todo, folder, workers, told)
+        progress.update(bar, description="runs")
+        steps = list(Data(folder, cell, size, records).steps())
+        bar = progress.add_task("figure data", total=len(steps) + 2)
+        for name, work in steps:
+            progress.update(bar, description=name)
+            work()
+            progress.advance(bar)
+        progress.update(bar, description="tables")
+        table = write_tables(folder)
+        progress.update(bar, advance=1, description="figures")
+        write_plots(folder, progress.console.print)
+        progress.update(bar, advance=1, description="data, tables, figures")
+    return table
+
+
+def main() -> int:
+    """Run from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("results/paper"), help="folder of the study")
+    parser.add_argument("--workers", type=int, default=2, help="runs at once")
+    parser.add_argument("--quick", action="store_true", help="few seeds, coarse maps: to see that it works")
+    options = parser.parse_args()
+    console = Console(width=None if sys.stdout.isatty() else 100)
+    try:
+        table = reproduce(options.out, options.workers, QUICK if options.quick else FULL, console)
+    except NlpweldError as error:
+        print(error, file=sys.stderr)
+        return 2
+    console.print(format_summary(table))
+    console.print(f"tables, figures, plans and records: {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
