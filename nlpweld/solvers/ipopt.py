@@ -26,23 +26,27 @@ class Ipopt:
         hopeless: total violation after the third solve above which a descent is given up.
         descents: random starts at most.
         modes_tried: where there are discrete choices, how many are followed, the most promising first.
-        scouts: random candidates of the exact model that rank the discrete choices.
+        scouts: random candidates of the exact model, the best of which are started from (and rank the discrete
+            choices); 0 starts from the first random point itself.
         tol: Ipopt's tolerance.
         max_iter: Ipopt's iterations per solve.
     """
 
-    sharpness: float = 3.0
-    growth: float = 10.0
+    sharpness: float = 30.0
+    growth: float = 30.0
     sharpenings: int = 6
     settled: float = 1e-4
     hopeless: float = 1e-3
     descents: int = 10
     modes_tried: int = 3
-    scouts: int = 512
-    tol: float = 1e-6
+    scouts: int = 256
+    tol: float = 1e-4
     max_iter: int = 100
 
-    PRESETS: ClassVar[dict[str, dict[str, object]]] = {"default": {}}
+    PRESETS: ClassVar[dict[str, dict[str, object]]] = {
+        "default": {},
+        "plain": {"scouts": 0, "sharpness": 3.0, "growth": 10.0},
+    }
 
     def unsuitable(self, nlp: Nlp) -> str | None:
         """Return why this solver cannot take the problem, or None when it can."""
@@ -66,11 +70,13 @@ class Ipopt:
     def _starts(self, search: Incumbent, seed: int) -> list[list[tuple[np.ndarray, int]]]:
         """Return groups of (start, mode); a group is followed whole, the next only if it brought nothing feasible."""
         nlp = search.nlp
-        if nlp.n_modes == 1:
+        if self.scouts == 0 and nlp.n_modes == 1:
             return [[(start, 0)] for start in nlp.starts(seed, self.descents)]
-        X = nlp.starts(seed, self.scouts)
+        X = nlp.starts(seed, self.scouts or self.descents)
         found = search.evaluate(X)
         order = np.lexsort((-found.objective, found.total))
+        if nlp.n_modes == 1:
+            return [[(X[i], 0)] for i in order[: self.descents]]
         first = {int(found.mode[i]): X[i] for i in order[::-1]}  # the best scout of each mode
         ranked = list(dict.fromkeys(int(found.mode[i]) for i in order))
         starts = [(first[mode], mode) for mode in ranked]
