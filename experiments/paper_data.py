@@ -47,8 +47,15 @@ def profile_table(report: Report) -> pd.DataFrame:
 
 
 def arm_table(plan: Plan, point: int) -> pd.DataFrame:
-    """Return the links of every robot at one seam point: robot, link, x_m, y_m, z_m; the last link is the TCP."""
-    rows = []
+    """Return the links of every robot at one seam point: robot, link, x_m, y_m, z_m; the last link is the TCP.
+
+    The workpiece's bodies follow under their own names, each with the two ends of its axis.
+    """
+    T_W_C = reference.workpiece_pose(plan.cell, plan.placement_m, plan.s[[point]])
+    works = zip(plan.cell.workpiece.bodies, reference.workpiece_ends(plan.cell, T_W_C)[0], strict=True)
+    rows = [
+        {"robot": b.name, "link": i, **dict(zip(AXES, p, strict=True))} for b, ends in works for i, p in enumerate(ends)
+    ]
     for station in plan.cell.stations:
         T_W_L, T_W_E, _ = _kinematics(plan, station, point)
         for i, p in enumerate([*T_W_L[0, :, :3, 3], T_W_E[0, :3, 3]]):
@@ -56,15 +63,16 @@ def arm_table(plan: Plan, point: int) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def ellipsoid_table(plan: Plan, point: int) -> pd.DataFrame:
-    """Return J_v J_v^T of every robot at one seam point [m^2/rad^2] as core_11 .. core_33, with TCP and s."""
+def ellipsoid_table(plan: Plan, report: Report, point: int) -> pd.DataFrame:
+    """Return J_v J_v^T of every robot at one seam point as core_11 .. core_33 [m^2/rad^2], TCP, s and r_k."""
     rows = []
     for station in plan.cell.stations:
         _, T_W_E, J = _kinematics(plan, station, point)
         core = J[0, :3] @ J[0, :3].T
         names = {f"core_{i + 1}{j + 1}": core[i, j] for i in range(3) for j in range(3)}
         at = dict(zip(AXES, T_W_E[0, :3, 3], strict=True))
-        rows.append({"robot": station.name, "s": plan.s[point], **at, **names})
+        ratio = report.profile[f"ratio.{station.name}"][point]
+        rows.append({"robot": station.name, "s": plan.s[point], **at, **names, "ratio": ratio})
     return pd.DataFrame(rows)
 
 

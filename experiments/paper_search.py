@@ -19,7 +19,8 @@ from nlpweld.kinematics.manipulability import mmr
 from nlpweld.report.records import AXES
 
 Badness = Callable[[np.ndarray, np.ndarray], np.ndarray]
-ROUNDS, BROOD = 14, 64  # of the local search that follows the scan
+ROUNDS, BROOD = 14, 31  # of the local search that follows the scan
+FIRST_STEP_M, SHRINK = 0.1, 0.7
 
 
 def without_floor(cell: Cell) -> Cell:
@@ -65,35 +66,43 @@ class Profiles:
         return np.stack(w, axis=1), mmr(self.cell.objective.reading, w, [out[2][0] for out in found], tight)
 
 
-def worst_placement(profiles: Profiles, badness: Badness, scan: int, seed: int = 0) -> np.ndarray:
-    """Return the placement, reachable and inside the joint limits, that maximises a badness, shape (3,) [m].
+def worst_placements(
+    profiles: Profiles, badness: dict[str, Badness], scan: int, seed: int = 0
+) -> dict[str, np.ndarray]:
+    """Return for each badness the placement, reachable and inside the joint limits, that maximises it, shape (3,) [m].
 
-    A Sobol scan of S, then rounds of Gaussian steps that shrink around the best.
+    One Sobol scan of S for all, then for each rounds of Gaussian steps that shrink around the best.
 
     Args:
         profiles: of the cell without its singularity floor.
-        badness: from w (m, robots, N) and MMR (m, N) to a value (m,).
+        badness: by name, from w (m, robots, N) and MMR (m, N) to a value (m,).
         scan: candidates of the scan, a power of two.
         seed: seed of scan and steps.
     """
     low, high = profiles.cell.box
     rng = np.random.default_rng(seed)
-    X = qmc.scale(qmc.Sobol(3, rng=rng).random(scan), low, high)
-    best, worst = X[0], -np.inf
-    for k in range(ROUNDS + 1):
-        values = np.where(_possible(profiles, X), badness(*profiles(X)), -np.inf)
-        if values.max() > worst:
-            best, worst = X[values.argmax()], values.max()
-        X = np.clip(best + 0.1 * 0.7**k * rng.standard_normal((BROOD, 3)), low, high)
+    X = _possible(profiles, qmc.scale(qmc.Sobol(3, rng=rng).random(scan), low, high))
+    w, value = profiles(X)
+    return {name: _climb(profiles, bad, X[bad(w, value).argmax()], rng) for name, bad in badness.items()}
+
+
+def _climb(profiles: Profiles, badness: Badness, best: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return where rounds of shrinking random steps from a possible placement end."""
+    low, high = profiles.cell.box
+    for k in range(ROUNDS):
+        steps = FIRST_STEP_M * SHRINK**k * rng.standard_normal((BROOD, 3))
+        X = _possible(profiles, np.vstack([best, np.clip(best + steps, low, high)]))
+        best = X[badness(*profiles(X)).argmax()]
     return best
 
 
 def _possible(profiles: Profiles, X: np.ndarray) -> np.ndarray:
+    """Return the placements that are within reach and inside the joint limits."""
     violation = profiles.batch.evaluate(X).violation
-    return (violation[:, [CONSTRAINTS.index("reach"), CONSTRAINTS.index("joint_limit")]] == 0.0).all(axis=1)
+    return X[(violation[:, [CONSTRAINTS.index("reach"), CONSTRAINTS.index("joint_limit")]] == 0.0).all(axis=1)]
 
 
-def slice_map(nlp: Nlp, at: np.ndarray, axis: int, points: int) -> pd.DataFrame:
+def slice_map(nlp: Nlp, at: np.ndarray, axis: int, points: int, within_m: float = np.inf) -> pd.DataFrame:
     """Return MMR and the first constraint that fails over a slice of S.
 
     Args:
@@ -101,11 +110,13 @@ def slice_map(nlp: Nlp, at: np.ndarray, axis: int, points: int) -> pd.DataFrame:
         at: the point the slice goes through, shape (3,) [m].
         axis: index of the coordinate that is held.
         points: grid points along each of the other two.
+        within_m: how far the slice goes from the point, at most.
 
     Returns:
         x_m, y_m, z_m, mmr, first_failing (``feasible`` where none fails), row by row.
     """
-    grids = [np.linspace(lo, hi, points) for lo, hi in zip(nlp.lower, nlp.upper, strict=True)]
+    low, high = np.maximum(nlp.lower, at - within_m), np.minimum(nlp.upper, at + within_m)
+    grids = [np.linspace(lo, hi, points) for lo, hi in zip(low, high, strict=True)]
     grids[axis] = at[[axis]]
     X = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, 3)
     found = nlp.evaluate(X)

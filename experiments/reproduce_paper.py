@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from paper_data import arm_table, ellipsoid_table, ga_individuals, ipopt_path, profile_table, seam_table, welder
-from paper_search import Profiles, near_singular, slice_map, unsteady, without_floor, worst_placement
+from paper_search import Profiles, near_singular, slice_map, unsteady, without_floor, worst_placements
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -36,6 +36,7 @@ from nlpweld.verify import Report, verify
 
 CELL, ANY = "three_er16", "three_er16-any"
 PAPER = "Pan et al. C"
+MAPS = {"": np.inf, "near_": 0.22}  # whole slices of S, and what is within so many metres of the optimum
 ELLIPSOID_POINT = 0  # the seam point of Fig. 3
 Record = dict[str, Any]
 Step = tuple[str, Callable[[], None]]
@@ -86,20 +87,23 @@ class Data:
         """Yield name and work of every step."""
         nlp, paper = reduced(self.cell), np.array(self.cell.placements["paper"])
         best = self._best(CELL)
+        if not best:
+            raise NlpweldError(f"{self.folder}: no run of {CELL} was verified; see what 'nlpweld tables' makes of it")
         optimum = _placement(best)
         yield "the paper's C", lambda: self._paper(nlp, paper, CELL)
         yield "the paper's C, all branches", lambda: self._paper(reduced(with_branches(self.cell, "any")), paper, ANY)
         yield "optimum", lambda: self._optimum(nlp, optimum)
+        if best_any := self._best(ANY):
+            any_nlp, at = reduced(with_branches(self.cell, "any")), _placement(best_any)
+            yield "optimum, all branches", lambda: self._plan("optimum_any", *evaluate_plan(any_nlp, at))
         yield "solvers' paths", lambda: self._paths(nlp, optimum)
         for axis, name in enumerate(AXES):
             yield f"map, {name[0]} held", lambda axis=axis: self._map(nlp, optimum, axis)
         yield "poor placements", self._poor
 
-    def _best(self, label: str) -> Record:
+    def _best(self, label: str) -> Record | None:
         good = [r for r in self.records if r["cell"] == label and r["verified"]]
-        if not good:
-            raise NlpweldError(f"{self.folder}: no run of {label} was verified; look at tables/runs.csv")
-        return max(good, key=lambda r: r["report"]["mmr_mean"])
+        return max(good, key=lambda r: r["report"]["mmr_mean"], default=None)
 
     def _paper(self, nlp: Nlp, at: np.ndarray, label: str) -> None:
         plan, report = evaluate_plan(nlp, at)
@@ -115,7 +119,7 @@ class Data:
         self._plan("optimum", plan, report)
         if plan:
             self._csv("arms", arm_table(plan, ELLIPSOID_POINT))
-            self._csv("ellipsoids", ellipsoid_table(plan, ELLIPSOID_POINT))
+            self._csv("ellipsoids", ellipsoid_table(plan, report, ELLIPSOID_POINT))
 
     def _paths(self, nlp: Nlp, optimum: np.ndarray) -> None:
         own = [r for r in self.records if r["cell"] == CELL]
@@ -124,14 +128,15 @@ class Data:
         self._csv("ipopt_path", ipopt_path([r for r in own if r["solver"] == "ipopt"], optimum))
 
     def _map(self, nlp: Nlp, optimum: np.ndarray, axis: int) -> None:
-        self._csv(f"map_{AXES[axis][0]}", slice_map(nlp, optimum, axis, self.size.map_points))
+        for kind, within_m in MAPS.items():
+            self._csv(f"map_{kind}{AXES[axis][0]}", slice_map(nlp, optimum, axis, self.size.map_points, within_m))
 
     def _poor(self) -> None:
         profiles = Profiles(without_floor(self.cell))
-        rows = []
-        for name, badness in {"near_singular": near_singular, "unsteady": unsteady}.items():
-            at = worst_placement(profiles, badness, self.size.scan)
-            plan, report = evaluate_plan(reduced(profiles.cell), at)
+        nlp, rows = reduced(profiles.cell), []
+        found = worst_placements(profiles, {"near_singular": near_singular, "unsteady": unsteady}, self.size.scan)
+        for name, at in found.items():
+            plan, report = evaluate_plan(nlp, at)
             self._plan(name, plan, report)
             rows.append({"name": name, **dict(zip(AXES, at, strict=True)), **self._verdict(plan, report)})
         self._csv("poor_placements", pd.DataFrame(rows))
@@ -163,7 +168,7 @@ def median_seed(records: list[Record]) -> int:
     return int(ranked[(len(ranked) - 1) // 2]["seed"])
 
 
-def reproduce(folder: Path, workers: int, size: Size, console: Console) -> pd.DataFrame:
+def reproduce(folder: Path, workers: int, size: Size, console: Console, figures: bool = True) -> pd.DataFrame:
     """Do the whole study in a folder and return the summary table."""
     cell = load_cell(CELL)
     todo = tasks(cell, size)
@@ -186,7 +191,8 @@ def reproduce(folder: Path, workers: int, size: Size, console: Console) -> pd.Da
         progress.update(bar, description="tables")
         table = write_tables(folder)
         progress.update(bar, advance=1, description="figures")
-        write_plots(folder, progress.console.print)
+        if figures:
+            write_plots(folder, progress.console.print)
         progress.update(bar, advance=1, description="data, tables, figures")
     return table
 
@@ -197,14 +203,16 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("results/paper"), help="folder of the study")
     parser.add_argument("--workers", type=int, default=2, help="runs at once")
     parser.add_argument("--quick", action="store_true", help="few seeds, coarse maps: to see that it works")
+    parser.add_argument("--no-figures", action="store_true", help="stop after data and tables")
     options = parser.parse_args()
     console = Console(width=None if sys.stdout.isatty() else 100)
     try:
-        table = reproduce(options.out, options.workers, QUICK if options.quick else FULL, console)
+        size = QUICK if options.quick else FULL
+        table = reproduce(options.out, options.workers, size, console, not options.no_figures)
     except NlpweldError as error:
         print(error, file=sys.stderr)
         return 2
-    console.print(format_summary(table))
+    console.print(format_summary(table, console.width))
     console.print(f"tables, figures, plans and records: {options.out}")
     return 0
 

@@ -26,16 +26,23 @@ def first_complaint(error: ValidationError, data: Any, where: str = "") -> str:
 
 
 def field_path(complaint: Any, data: Any) -> str:
-    """Return a field as the file has it: list items by their name, and without the branches a union tried."""
+    """Return a field as the file has it: list items by name or else counted from 1, no branches that a union tried."""
     parts, loc = [], list(complaint["loc"])
     absent = loc.pop() if complaint["type"] == "missing" else None
     for part in loc:
         if not _holds(data, part):
             continue  # a branch of a union, not a key of the file
         data = data[part]
-        named = isinstance(part, int) and isinstance(data, dict) and isinstance(data.get("name"), str)
-        parts.append(data["name"] if named else str(part))
-    return ".".join(parts if absent is None else [*parts, str(absent)])
+        parts.append(_called(part, data))
+    return ".".join(parts if absent is None else [*parts, _called(absent, None)])
+
+
+def _called(part: int | str, item: Any) -> str:
+    """Return what a key or list item is called; joints and stations count from 1."""
+    if isinstance(part, str):
+        return part
+    named = isinstance(item, dict) and isinstance(item.get("name"), str)
+    return item["name"] if named else str(part + 1)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -34,7 +34,7 @@ def load_cell(name_or_path: str | Path) -> Cell:
     data = read_toml(path)
     tools = _tools(data.pop("tools", {}), path)
     unused = set(tools)
-    for i, station in enumerate(_stations(data, path)):
+    for i, station in enumerate(_stations(data, path), start=1):
         where = f"stations.{station.get('name', i)}"
         unused.discard(str(station.get("tool")))
         station["robot"] = _robot_data(station.get("robot"), path, where)

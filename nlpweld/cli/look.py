@@ -2,7 +2,7 @@
 
 import json as json_
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
@@ -12,6 +12,9 @@ from rich.table import Table
 from nlpweld.cell import library_names, load_cell, load_robot
 from nlpweld.cell.checked import Checked, Sourced, holds_number
 from nlpweld.cli.ask import Question, writable
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def cells(json: bool) -> None:
@@ -85,7 +88,7 @@ def _text(value: Any) -> str:
 def compare(asked: list[Question], out: Path, workers: int, json: bool) -> int:
     """Run the grid, keep the records, print the table; 0 when at least one answer is verified."""
     from nlpweld.bench.run import grid, run
-    from nlpweld.report.tables import format_summary, write_tables
+    from nlpweld.report.tables import write_tables
     from nlpweld.solvers import Budget
 
     writable(out)
@@ -103,7 +106,7 @@ def compare(asked: list[Question], out: Path, workers: int, json: bool) -> int:
     if json:
         print(json_.dumps({"out": str(out), "runs": len(records), "verified": sum(r["verified"] for r in records)}))
     else:
-        Console().print(format_summary(summary))
+        _print_summary(summary)
         print(f"records and tables: {out}")
     return 0 if any(r["verified"] for r in records) else 1
 
@@ -122,20 +125,27 @@ def progress_bar(quiet: bool = False) -> Progress:
 
 def tables(folder: Path, json: bool) -> None:
     """Write and print the summary of a folder of records."""
-    from nlpweld.report.tables import format_summary, write_tables
+    from nlpweld.report.tables import write_tables
 
     summary = write_tables(folder)
     if json:
         print(summary.to_json(orient="records"))
     else:
-        Console().print(format_summary(summary))
+        _print_summary(summary)
+
+
+def _print_summary(summary: "pd.DataFrame") -> None:
+    from nlpweld.report.tables import format_summary
+
+    console = Console()
+    console.print(format_summary(summary, console.width))
 
 
 def plots(folder: Path, json: bool) -> None:
     """Draw the figures of a folder of records."""
     from nlpweld.report.plots import write_plots
 
-    paths = write_plots(folder)
+    paths = write_plots(folder, note=None if json else print)
     if json:
         print(json_.dumps({"figures": [str(path) for path in paths]}))
     else:

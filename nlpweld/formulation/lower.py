@@ -39,7 +39,7 @@ UNARY = {
     ca.OP_SIGN: "sign({0})",
 }
 FUNCTIONS = ("minimum", "maximum", "where", "sqrt", "absolute", "arctan2", "sin", "cos", "exp", "log", "log1p", "sign")
-NAMES = {name: getattr(np, name) for name in FUNCTIONS}
+NAMES = {name: getattr(np, name) for name in (*FUNCTIONS, "inf", "nan")}
 Lowered = Callable[..., tuple[list[Any], ...]]
 
 

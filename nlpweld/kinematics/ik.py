@@ -90,7 +90,7 @@ class SphericalArm:
 
     @cached_property
     def function(self) -> ca.Function:
-        """``ik(T_B_F, branch) -> q, reach`` with theta = q + offset (6, 1) [rad] in (-pi, pi]; for output, not graphs."""
+        """``ik(T_B_F, branch) -> q, reach`` with q + offset (6, 1) [rad] in (-pi, pi]; for output, not graphs."""
         T, branch = ca.SX.sym("T", 4, 4), ca.SX.sym("branch", 3)
         found = self.solve(Frame(T[:3, :3], T[:3, 3]), branch)
         q = ca.atan2(found.sin, found.cos) - ca.SX(np.array(self.offsets))
@@ -109,8 +109,8 @@ def spherical_arm(robot: Robot) -> SphericalArm:
     for joint, column, what in ((4, 0, "a_m"), (5, 0, "a_m"), (6, 0, "a_m"), (5, 1, "d_m")):
         if dh[joint - 1, column] != 0.0:
             raise KinematicsError(
-                f"robot '{robot.name}': joints.{joint}.{what} is {dh[joint - 1, column]:g}, so its wrist is not spherical; "
-                "the closed-form inverse needs 0 there, axes 4, 5 and 6 meeting in one point"
+                f"robot '{robot.name}': joints.{joint}.{what} is {dh[joint - 1, column]:g}, so its wrist is not "
+                "spherical; the closed-form inverse needs 0 there, axes 4, 5 and 6 meeting in one point"
             )
     turns = np.array([-90, 0, -90, 90, -90, 0])
     if not np.allclose(np.degrees(dh[:, 2]), turns) or dh[1, 1] != 0.0 or dh[2, 1] != 0.0:

@@ -74,7 +74,7 @@ def _product(factors: list[Any]) -> Any:
 
 
 def ellipsoid_volume(J_v: np.ndarray) -> float:
-    """Return the volume [m^3] of the velocity ellipsoid u^T (J_v J_v^T)^-1 u <= 1 of a translational Jacobian (3, n)."""
+    """Return the volume [m^3] of the velocity ellipsoid u^T (J_v J_v^T)^-1 u <= 1 of a Jacobian J_v (3, n)."""
     return float(4 / 3 * np.pi * np.sqrt(np.linalg.det(J_v @ J_v.T)))
 
 

@@ -59,8 +59,8 @@ def write(drawing: Drawing, study: Study) -> list[Path]:
         try:
             figure = drawing.draw(study)
         except KeyError as error:
-            source = study.folder / (drawing.needs[0] if drawing.needs else "records")
-            raise OutputError(f"{source}: column {error} is missing; make it again") from None
+            sources = ", ".join(str(study.folder / name) for name in drawing.needs or ("records",))
+            raise OutputError(f"{sources}: lacks a column ({error.args[0]}); make it again") from None
         try:
             paths[0].parent.mkdir(parents=True, exist_ok=True)
             for path in paths:

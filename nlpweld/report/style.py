@@ -4,9 +4,13 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 WIDTH_IN = 85 / 25.4
 DPI = 200
+LABELS = 0.06  # share of width and height kept for labels of 3-D axes, which the layout does not see
+MANY = 500.0  # span of a logarithmic axis from which decades alone are labelled
+ZOOM = 1.05  # of 3-D axes, which leave wide margins
 
 # Okabe and Ito's palette, in an order whose greys differ; robots also differ by line style.
 BLUE, ORANGE, GREEN, RED, SKY, PURPLE, YELLOW = (
@@ -55,13 +59,23 @@ def figure(height_mm: float = 60.0) -> Figure:
 
 def space(fig: Figure, elevation: float = 22.0, azimuth: float = -60.0, **where: Any) -> Any:
     """Return 3-D axes with equal scales, metres and a light grid."""
+    layout: Any = fig.get_layout_engine()
+    layout.set(rect=(0.0, LABELS, 1.0 - LABELS, 1.0 - LABELS))
     axes: Any = fig.add_subplot(projection="3d", **where)
     axes.view_init(elevation, azimuth)
+    axes.set_box_aspect(None, zoom=ZOOM)
     axes.tick_params(pad=-2, labelsize=6.5)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
         axis.pane.set_alpha(0.0)
         axis.labelpad = -4
     return axes
+
+
+def equal_scales(axes: Any) -> None:
+    """Give a metre the same length along all three axes, as far as the data goes."""
+    limits = [getattr(axes, f"get_{axis}lim")() for axis in "xyz"]
+    axes.set_box_aspect([high - low for low, high in limits], zoom=ZOOM)
 
 
 def name_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
@@ -72,11 +86,20 @@ def name_axes(axes: Axes, x: str, y: str, title: str = "") -> None:
         axes.set_title(title, loc="left")
 
 
+def plain_log(axis: Any) -> None:
+    """Label a logarithmic axis, already drawn on, with plain numbers at 1, 2 and 5, or at 1 over many decades."""
+    low, high = sorted(axis.get_view_interval())
+    few = low > 0 and high / low < MANY
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def legend_below(axes: Axes, columns: int, **options: Any) -> None:
     """Put the legend under the axes, where it hides nothing."""
     fig = axes.figure
     handles, labels = axes.get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=columns, **options)  # type: ignore[union-attr]
+    fig.legend(handles, labels, loc="outside lower center", ncols=columns, **options)
 
 
 def pretty(robot: str) -> str:

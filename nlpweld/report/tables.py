@@ -25,10 +25,15 @@ NARROW = {
     "build s": "build\n[s]", "solve s": "solve\n[s]", "to C mm": "to C\n[mm]",
 }  # fmt: skip
 SMALLEST_SPREAD = 1e-5  # what five decimals can show
+WIDE = 100  # columns of a screen that takes the whole summary
 COUNTS = ("runs", "claimed", "verified", "failed")
-LATEX = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "±": r"$\pm$", "<": r"$<$"} | {
-    c: f"\\{c}" for c in "&%$#_{}"
-}
+LATEX = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "±": r"$\pm$",
+    "<": r"$<$",
+} | {c: f"\\{c}" for c in "&%$#_{}"}
 
 
 def write_tables(folder: str | Path) -> pd.DataFrame:
@@ -76,13 +81,22 @@ def summary(runs: pd.DataFrame, baselines: pd.DataFrame) -> pd.DataFrame:
     return table.sort_values("cell", kind="stable")[[*order, *AXES]].reset_index(drop=True)
 
 
-def format_summary(table: pd.DataFrame) -> Table:
-    """Return the summary as a rich table that fits 100 columns, with a section for each cell."""
+def format_summary(table: pd.DataFrame, width: int = 100) -> Table:
+    """Return the summary as a rich table with a section for each cell.
+
+    Args:
+        table: as from :func:`summary`.
+        width: columns of the screen; below 100 the best MMR and the build time are left out, which fits 80.
+    """
     text = _as_text(table)
+    if width < WIDE:
+        text = text.drop(columns=["best", "build s"])
     shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
     for name in text.columns:
         left = name == "solver"
-        shown.add_column(escape(NARROW.get(name, name)), justify="left" if left else "right", overflow="fold", no_wrap=not left)
+        shown.add_column(
+            escape(NARROW.get(name, name)), justify="left" if left else "right", overflow="fold", no_wrap=not left
+        )
     previous = None
     for cell, values in zip(table["cell"], text.to_numpy(), strict=True):
         if cell != previous:

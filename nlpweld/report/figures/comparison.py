@@ -22,7 +22,7 @@ def drawings(study: Study) -> list[Drawing]:
 
 
 def labelled(table: pd.DataFrame, cell: str) -> pd.DataFrame:
-    """Return the rows of one cell with a ``label`` that names solver, preset, and formulation where several are there."""
+    """Return the rows of one cell with a ``label``: solver, preset, and formulation where there are several."""
     own = table[table["cell"] == cell].copy()
     preset = own["preset"].where(own["preset"] != "default", "")
     own["label"] = own["solver"] + preset.map(lambda p: f":{p}" if p else "")
@@ -40,8 +40,9 @@ def mmr_by_solver(study: Study, cell: str) -> Figure:
     for i, label in enumerate(labels):
         _strip(axes, i, runs[runs["label"] == label], "mmr_mean", style.SERIES[i % len(style.SERIES)])
     _reference(axes, study.baselines, cell)
+    axes.margins(y=0.1)
     _solver_axis(axes, runs, labels)
-    style.name_axes(axes, "solver (verified of runs)", "mean MMR along the seam [mixed m$^6$, m$^3$]", cell)
+    style.name_axes(axes, "solver (verified of runs)", _mmr_label(runs, "mean MMR"), cell)
     _legend_of_marks(axes, bool((~runs["verified"] & runs["mmr_mean"].notna()).any()))
     return fig
 
@@ -56,14 +57,15 @@ def solve_time_by_solver(study: Study, cell: str) -> Figure:
     for i, label in enumerate(labels):
         ended = runs[(runs["label"] == label) & ~runs["status"].isin(["FAILED", "SKIPPED"]) & (runs["solve_s"] > 0)]
         _strip(axes, i, ended, "solve_s", style.SERIES[i % len(style.SERIES)])
+    style.plain_log(axes.yaxis)
     _solver_axis(axes, runs, labels)
-    style.name_axes(axes, "solver (verified of runs)", "time to solve, without build [s]", cell)
+    style.name_axes(axes, "solver (verified of runs)", "solve time, no build [s]", cell)
     _legend_of_marks(axes, not runs["verified"].all())
     return fig
 
 
 def progress(study: Study, cell: str) -> Figure:
-    """Draw the best MMR so far against evaluations of the model: median and range over seeds."""
+    """Draw the best MMR so far against evaluations of the model: median and quartiles over seeds."""
     traces = labelled(study.traces, cell)
     fig = style.figure(64)
     axes = fig.add_subplot()
@@ -71,32 +73,46 @@ def progress(study: Study, cell: str) -> Figure:
     for i, (label, steps) in enumerate(traces.groupby("label")):
         grid, best = best_so_far(steps)
         colour = style.SERIES[i % len(style.SERIES)]
-        middle, low, high = _range(best)
-        axes.fill_between(grid, low, high, color=colour, alpha=0.18, linewidth=0, step="post")
+        low, middle, high = _quartiles(best)
+        axes.fill_between(grid, low, high, color=colour, alpha=0.2, linewidth=0, step="post")
         axes.step(grid, middle, where="post", color=colour, ls=style.LINES[i % len(style.LINES)], label=label)
     _reference(axes, study.baselines, cell)
-    style.name_axes(axes, "evaluations", "best MMR so far [mixed m$^6$, m$^3$]", f"{cell}: median and range of seeds")
+    style.plain_log(axes.xaxis)
+    style.name_axes(
+        axes, "evaluations", _mmr_label(study.runs, "best MMR so far"), f"{cell}: median, quartiles of seeds"
+    )
     style.legend_below(axes, 3)
     return fig
 
 
 def best_so_far(steps: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Return a grid of evaluations (g,) and the best value of each seed there, shape (seeds, g); NaN before the first."""
+    """Return a grid of evaluations (g,) and each seed's best value there (seeds, g), NaN before the first.
+
+    A run whose answer was not verified has no value at all: its trace is a claim.
+    """
     grid = np.unique(steps["evaluations"].to_numpy())
     rows = []
     for _, run in steps.groupby("seed"):
         at = np.searchsorted(run["evaluations"].to_numpy(), grid, side="right") - 1
-        best = run["best"].cummax().ffill().to_numpy()
+        best = run["best"].where(run["verified"]).cummax().ffill().to_numpy()
         rows.append(np.where(at >= 0, best[np.maximum(at, 0)], np.nan))
     return grid, np.array(rows)
 
 
-def _range(best: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return median, least and greatest over the seeds, only where more than half of them have a feasible point."""
-    enough = 2 * np.isfinite(best).sum(axis=0) > len(best)
-    result = np.full((3, best.shape[1]), np.nan)
-    result[:, enough] = [f(best[:, enough], axis=0) for f in (np.nanmedian, np.nanmin, np.nanmax)]
-    return result[0], result[1], result[2]
+def _quartiles(best: np.ndarray) -> np.ndarray:
+    """Return lower quartile, median and upper quartile over the seeds, shape (3, g).
+
+    A seed without a feasible point yet counts as the worst; where that leaves no value there is NaN.
+    """
+    filled = np.where(np.isfinite(best), best, -np.inf)
+    result = np.quantile(filled, (0.25, 0.5, 0.75), axis=0, method="inverted_cdf")
+    result[0] = np.where(np.isfinite(result[0]), result[0], result[np.isfinite(result)].min(initial=np.inf))
+    return np.where(np.isfinite(result[1]), result, np.nan)
+
+
+def _mmr_label(runs: pd.DataFrame, what: str) -> str:
+    """Return an axis label; eq. (16) of Pan et al. adds m^6 to m^3, so the unit of length is all there is to say."""
+    return f"{what} [lengths in {'mm' if (runs['reading'] == 'millimetres').any() else 'm'}]"
 
 
 def _strip(axes: Axes, place: int, runs: pd.DataFrame, column: str, colour: str) -> None:
