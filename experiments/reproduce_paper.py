@@ -59,8 +59,9 @@ class Size:
     scan: int
 
 
-FULL = Size({"ipopt": 20, "ga": 10, "ga:paper": 10, "random_search": 10, "any ipopt": 3, "any ga": 2}, 5000, 80, 4096)
-QUICK = Size({"ipopt": 1, "ga": 2, "ga:paper": 1, "random_search": 1, "any ga": 1}, 600, 12, 256)
+RUNS = {"ipopt": 20, "ipopt:plain": 20, "ga": 10, "ga:paper": 10, "random_search": 10, "any ipopt": 3, "any ga": 2}
+FULL = Size(RUNS, 5000, 80, 4096)
+QUICK = Size({"ipopt:plain": 1, "ga": 2, "ga:paper": 1, "random_search": 1, "any ga": 1}, 600, 12, 256)
 
 
 def tasks(cell: Cell, size: Size) -> list[Task]:
@@ -68,7 +69,7 @@ def tasks(cell: Cell, size: Size) -> list[Task]:
     found: list[Task] = []
     for name, seeds in size.seeds.items():
         solver = name.removeprefix("any ")
-        budget = Budget(time_s=300.0, evaluations=None if solver == "ipopt" else size.evaluations)
+        budget = Budget(time_s=300.0, evaluations=None if solver.startswith("ipopt") else size.evaluations)
         own, label = (cell, CELL) if name == solver else (with_branches(cell, "any"), ANY)
         found += grid([own], [solver], range(seeds), budget=budget, label=label)
     return found
@@ -125,7 +126,7 @@ class Data:
         own = [r for r in self.records if r["cell"] == CELL]
         seed = median_seed([r for r in own if r["solver"] == "ga" and r["preset"] == "default"])
         self._csv("ga_individuals", ga_individuals(nlp, seed, Budget(self.size.evaluations)).assign(seed=seed))
-        self._csv("ipopt_path", ipopt_path([r for r in own if r["solver"] == "ipopt"], optimum))
+        self._csv("ipopt_path", ipopt_path([r for r in own if r["preset"] == "plain"], optimum))
 
     def _map(self, nlp: Nlp, optimum: np.ndarray, axis: int) -> None:
         for kind, within_m in MAPS.items():

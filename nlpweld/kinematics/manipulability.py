@@ -82,7 +82,7 @@ def intersection_volume(jacobians: Sequence[np.ndarray], order: int = 131) -> fl
     """Return the volume common to several velocity ellipsoids moved to one centre [m^3].
 
     Vol = (1/3) * surface integral of min_k rho_k(u)^3 with rho_k(u) = (u^T (J_v J_v^T)^-1 u)^(-1/2), by Lebedev
-    quadrature. The integrand has kinks where the nearest ellipsoid changes, so expect about four digits.
+    quadrature. The integrand has kinks where the nearest ellipsoid changes, so expect between three and four digits.
 
     Args:
         jacobians: translational Jacobians, each (3, n).

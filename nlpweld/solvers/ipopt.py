@@ -107,7 +107,7 @@ class _Run:
             self.iterations += solver.stats()["iter_count"]
             self.last = solver.stats()["return_status"]
             found = self.search.evaluate(np.clip(x, self.nlp.lower, self.nlp.upper)[None])
-            self.search.note()
+            self.search.note(x)
             gain = float(found.objective[0]) - before
             before = float(found.objective[0])
             if self.search.out_of(self.budget):

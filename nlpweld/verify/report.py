@@ -199,8 +199,8 @@ class Report:
             least, along = self.manipulability_min[name], self.singularity_min[name]
             lines.append(f"    {name:<15.15} {mean:<10.6f} {least:<17.6f} {along:.6f}")
         pair = "" if self.closest_pair is None else f", {self.closest_pair} at s {self.closest_s:.4f}"
-        along = f"{1e3 * self.clearance_along_m:.3f} mm along the seam"
-        clearance = f"  clearance         {1e3 * self.clearance_m:.3f} mm{pair}; {along}"
+        whole = f"{1e3 * self.clearance_along_m:.3f} mm along the seam"
+        clearance = f"  clearance         {1e3 * self.clearance_m:.3f} mm{pair}; {whole}"
         lines += textwrap.wrap(clearance, WIDTH, subsequent_indent=" " * 20)
         return [
             *lines,

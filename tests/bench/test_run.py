@@ -74,7 +74,7 @@ def test_a_process_that_dies_or_hangs_is_one_record(cell, tmp_path, monkeypatch,
 
 def test_an_unwritable_folder_is_refused_before_anything_runs(cell, tmp_path):
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(OutputError, match="in the way|file"):
+    with pytest.raises(OutputError, match="file"):
         run(grid([cell], ["random_search"], [0]), tmp_path / "file" / "study")
     assert (tmp_path / "file").read_text() == "in the way"
 

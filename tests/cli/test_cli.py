@@ -72,7 +72,9 @@ def test_a_placement_out_of_reach_names_robot_and_point(call):
 
 
 def test_named_placement_points_and_reading_change_the_question(call):
-    _, out, _ = call("evaluate", "three_er16", "--placement", "paper", "--points", 24, "--reading", "sqrt_tight", "--json")
+    _, out, _ = call(
+        "evaluate", "three_er16", "--placement", "paper", "--points", 24, "--reading", "sqrt_tight", "--json"
+    )
     found = json.loads(out)
     assert (found["n_points"], found["reading"]) == (24, "sqrt_tight")
     assert found["at"] == [0.023, -0.266, 0.404]

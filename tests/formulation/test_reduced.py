@@ -83,14 +83,15 @@ def test_named_wrist_is_the_side_to_which_the_hand_bends(cell: Cell, wrist: str)
         assert ((bend > 0) == (wrist == "noflip")).all()
 
 
-def test_wrist_chosen_among_both_is_named_as_the_hand_bends(nlp: Nlp) -> None:
-    named = set()
-    for x in np.random.default_rng(41).uniform((-0.4, -0.5, 0.2), (0.4, 0.1, 0.7), (60, 3)):
-        plan = nlp.unpack(x, 0)
-        for name, branch in plan.branches.items() if isinstance(plan, Plan) else ():
-            assert (np.sin(plan.paths[name][:, 4]) > 0).all() == (branch[2] == "noflip")  # joint 5 has no offset
-            named.add(branch[2])
-    assert named == {"noflip", "flip"}
+def test_wrist_chosen_among_both_is_named_as_the_hand_bends(cell: Cell) -> None:
+    station = cell.stations[0]
+    joints = list(station.robot.joints)
+    joints[4] = joints[4].model_copy(update={"upper_deg": -1.0})  # handler_1's hand bends to one side only
+    robot = station.robot.model_copy(update={"joints": tuple(joints)})
+    one_sided = cell.model_copy(update={"stations": (station.model_copy(update={"robot": robot}), *cell.stations[1:])})
+    plan = reduced(one_sided).unpack(PAPER, 0)
+    assert [plan.branches[s.name][2] for s in cell.stations] == ["flip", "noflip", "noflip"]
+    assert (plan.paths["handler_1"][:, 4] < 0).all()
 
 
 def test_placement_out_of_reach_unpacks_to_who_cannot_reach_which_point(nlp: Nlp, batch: Batch) -> None:

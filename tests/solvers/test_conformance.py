@@ -13,8 +13,8 @@ EVERY = [(name, preset) for name in solver_names() for preset in presets(name)]
 PARTLY = 0.4  # radius of the disc: its rim, not the peak, is the answer
 
 
-def solve(name, preset, nlp, seed=0, budget=Budget()):
-    return make_solver(name, preset).solve(nlp, seed=seed, budget=budget)
+def solve(name, preset, nlp, seed=0, budget=None):
+    return make_solver(name, preset).solve(nlp, seed=seed, budget=budget or Budget())
 
 
 def test_the_paper_s_solvers_are_there():
