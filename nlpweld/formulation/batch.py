@@ -1,46 +1,63 @@
-"""The exact model over whole populations: the stage's graphs lowered to NumPy, joint paths unwrapped, modes chosen."""
+"""The exact model over whole populations: the stage's graphs over arrays, joint paths unwrapped, modes chosen."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from nlpweld.cell.cell import Cell
 from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.lower import lower
+from nlpweld.formulation.engine import Engine, Lanes, engine, rows
 from nlpweld.formulation.nlp import Evaluation
-from nlpweld.formulation.paths import joint_paths, on_best_wrist
-from nlpweld.formulation.stage import Stage
+from nlpweld.formulation.paths import Limits, best_wrist
+from nlpweld.formulation.stage import Stage, with_lowest_gap
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import ELBOW, SHOULDER, WRIST
 from nlpweld.kinematics.manipulability import mmr
 
 CONSTRAINTS = ("reach", "joint_limit", "singularity", "clearance")
 GAP_SCALE_M = 0.1  # a clearance missed by this much counts as one
+NEAR = 0.1  # share of the singularity floor that may lack for a candidate to be looked at any further
 CHUNK = 32  # candidates whose arrays fit the cache together
 
 
 @dataclass(eq=False)
 class Side:
-    """One station on one arm branch, over a chunk of m candidates and N points."""
+    """One station on one arm branch, over m candidates and N points.
 
+    Attributes:
+        missed: how far each constraint is missed, shape (m, 4) by ``CONSTRAINTS``.
+        slot: for each candidate its row in the arrays below, or -1 where it was not looked at any further, (m,).
+        w: manipulability, shape (r, N) [m^3].
+        gram: det(J_v J_v^T), shape (r, N) [m^6].
+        ends: body ends, arrays (r, N) [m].
+    """
+
+    missed: np.ndarray
+    slot: np.ndarray
     w: np.ndarray
     gram: np.ndarray
-    ends: list[np.ndarray]
-    missed: np.ndarray  # (m, 4) by CONSTRAINTS
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """Which candidates this station can serve, shape (m,)."""
-        return self.missed.sum(axis=1) == 0.0
+    ends: Lanes
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Evaluates placements of one cell, X (m, 3) [m], at the cell's own seam points with the solvers' margins."""
+    """Evaluates placements of one cell, X (m, 3) [m], at the cell's own seam points with the solvers' margins.
+
+    Reach, joint limits and singularity come first; velocity ellipsoids (and so the objective) and clearances are
+    looked at only for candidates that keep them or lack less than a tenth of the singularity floor, and clearances
+    between robots only where each robot alone is feasible.
+
+    Attributes:
+        cell: the cell.
+        engine: ``numpy``, ``numba`` (the ``fast`` extra), or ``auto`` for the fastest there is.
+    """
 
     cell: Cell
+    engine: str = "auto"
 
     @cached_property
     def stage(self) -> Stage:
@@ -59,62 +76,90 @@ class Batch:
         return list(product(allowed(c.shoulder, SHOULDER), allowed(c.elbow, ELBOW)))
 
     @cached_property
-    def _points(self) -> list[np.ndarray]:
-        return [row[None, :] for row in point_data(self.cell, seam_parameters(self.cell))]
+    def _points(self) -> np.ndarray:
+        return point_data(self.cell, seam_parameters(self.cell))
 
     @cached_property
-    def _arms(self) -> list:
-        return [lower(arm) for arm in self.stage.arms]
+    def _joint_limits(self) -> list[Limits]:
+        return [Limits.of(station.robot) for station in self.cell.stations]
 
     @cached_property
-    def _meetings(self) -> dict:
-        return {pair: lower(f) for pair, f in self.stage.meetings.items()}
+    def _compile(self) -> Engine:
+        return engine(self.engine)
 
     @cached_property
-    def _work_height(self) -> object:
-        return lower(self.stage.workpiece_height)
+    def _grips(self) -> list[Callable[..., Any]]:
+        return [self._compile.kernel(grip, ("candidate", "point", "number")) for grip in self.stage.grips]
+
+    @cached_property
+    def _limbs(self) -> list[Callable[..., Any]]:
+        return [self._compile.kernel(with_lowest_gap(f), ("candidate", "point", "lane")) for f in self.stage.limbs]
+
+    @cached_property
+    def _meetings(self) -> dict[tuple[int, int], Callable[..., Any]]:
+        return {p: self._compile.kernel(with_lowest_gap(f), ("lane", "lane")) for p, f in self.stage.meetings.items()}
+
+    @cached_property
+    def _height(self) -> Callable[..., Any]:
+        return self._compile.kernel(with_lowest_gap(self.stage.workpiece_height), ("candidate", "point"))
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X, shape (m, 3) [m]."""
         X = np.atleast_2d(np.asarray(X, dtype=float))
-        parts = [self._chunk(X[i : i + CHUNK]) for i in range(0, len(X), CHUNK)]
+        parts = [self._block(X[block]) for block in _slices(len(X), self._compile.block)]
         return Evaluation(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("objective", "violation", "mode")))
 
-    def _chunk(self, X: np.ndarray) -> Evaluation:
+    def _block(self, X: np.ndarray) -> Evaluation:
         sides = [[self._side(k, X, branch) for branch in self.arm_branches] for k in range(len(self.cell.stations))]
-        work = self._missed_gap(self._work_gap(X))
+        seen = np.all([np.any([side.slot >= 0 for side in branches], axis=0) for branches in sides], axis=0)
+        work = np.zeros(len(X))
+        work[seen] = self._missed_gap(self._lowest(self._height, X[seen]))
         best = Evaluation(np.full(len(X), -np.inf), np.full((len(X), 4), np.inf), np.zeros(len(X), dtype=int))
-        gaps: dict[tuple[int, int, int, int], np.ndarray] = {}
-        for index, choice in enumerate(product(range(len(self.arm_branches)), repeat=len(sides))):
+        met: dict[tuple[int, int, int, int], np.ndarray] = {}
+        for mode, choice in enumerate(product(range(len(self.arm_branches)), repeat=len(sides))):
             chosen = [side[b] for side, b in zip(sides, choice, strict=True)]
             missed = np.max([side.missed for side in chosen], axis=0)
             missed[:, 3] = np.maximum(missed[:, 3], work)
-            alive = missed.sum(axis=1) == 0.0
-            if alive.any():
-                missed[:, 3] = np.maximum(missed[:, 3], self._met(sides, choice, gaps))
-            _keep_better(best, self._mmr(chosen), missed, index)
+            missed[:, 3] = np.maximum(missed[:, 3], self._met(sides, choice, met))
+            _keep_better(best, self._mmr(chosen), missed, mode)
         return best
 
     def _side(self, k: int, X: np.ndarray, branch: tuple[str, str]) -> Side:
-        signs = (SHOULDER[branch[0]], ELBOW[branch[1]], 1)
-        cos_sin, (w,), (gram,), (reach,), ends, gaps = self._arms[k]([c[:, None] for c in X.T], self._points, signs)
+        """Grip with one station on one branch, then look at the limbs of those that pass or nearly so."""
+        missed, near, w, cos_sin = self._gripped(k, X, branch)
+        slot = np.full(len(X), -1)
+        slot[near] = np.arange(len(near))
+        parts = [self._limbs[k](X[near[c]], self._points, rows(cos_sin, c)) for c in _slices(len(near), CHUNK)]
+        if not parts:
+            nothing = np.empty((0, self._points.shape[1]))
+            return Side(missed, slot, nothing, nothing, [])
+        missed[near, 3] = self._missed_gap(np.concatenate([part[2][0].min(axis=1) for part in parts]))
+        return Side(missed, slot, w, _joined([part[0] for part in parts])[0], _joined([part[1] for part in parts]))
+
+    def _gripped(self, k: int, X: np.ndarray, branch: tuple[str, str]) -> tuple[Any, ...]:
+        """Return missed (m, 4), the rows worth going on with (r,), and their w (r, N) and cos_sin, twelve (r, N)."""
+        signs = np.array([SHOULDER[branch[0]], ELBOW[branch[1]], 1.0])
         limits = self.cell.constraints
         floor = limits.singularity_floor_m3 + limits.singularity_margin_m3
-        missed = np.empty((len(X), 4))
-        missed[:, 0] = np.maximum(0.0, -reach.min(axis=1))
-        missed[:, 1] = self._missed_joints(k, cos_sin, missed[:, 0] == 0.0)
-        missed[:, 2] = np.maximum(0.0, floor - w.min(axis=1)) / (floor or 1.0)
-        missed[:, 3] = self._missed_gap(lowest(gaps, len(X)))
-        return Side(w, gram, ends, missed)
+        missed, near, kept = np.zeros((len(X), 4)), [], []
+        for c in _slices(len(X), CHUNK):
+            cos_sin, (w,), (reach,) = self._grips[k](X[c], self._points, signs)
+            part = missed[c]
+            part[:, 0] = np.maximum(0.0, -reach.min(axis=1))
+            part[:, 1] = self._missed_joints(k, cos_sin, part[:, 0] == 0.0)
+            part[:, 2] = np.maximum(0.0, floor - w.min(axis=1)) / (floor or 1.0)
+            passed = np.flatnonzero((part[:, 0] == 0.0) & (part[:, 1] == 0.0) & (part[:, 2] < NEAR))
+            near.append(passed + c.start)
+            kept.append((w[passed], rows(cos_sin, passed)))
+        return missed, np.concatenate(near), np.concatenate([k[0] for k in kept]), _joined([k[1] for k in kept])
 
-    def _missed_joints(self, k: int, cos_sin: list[np.ndarray], reached: np.ndarray) -> np.ndarray:
+    def _missed_joints(self, k: int, cos_sin: Lanes, reached: np.ndarray) -> np.ndarray:
         """Return by how many half turns the best wrist misses its joint limits, for candidates within reach."""
         missed = np.zeros(len(reached))
         if reached.any():
-            robot = self.cell.stations[k].robot
-            q = joint_paths(robot, [np.broadcast_to(c, (len(reached), c.shape[1]))[reached] for c in cos_sin])
             need = np.radians(self.cell.constraints.joint_margin_deg)
-            _, margins, _ = on_best_wrist(robot, q, allowed(self.cell.configuration.wrist, WRIST), need)
+            wrists = allowed(self.cell.configuration.wrist, WRIST)
+            margins, _ = best_wrist(self._joint_limits[k], rows(cos_sin, reached), wrists, need)
             missed[reached] = np.maximum(0.0, need - margins) / np.pi
         return missed
 
@@ -125,28 +170,34 @@ class Batch:
             key = (k, l, choice[k], choice[l])
             if key not in known:
                 a, b = sides[k][choice[k]], sides[l][choice[l]]
+                both = np.flatnonzero((a.missed.sum(axis=1) == 0.0) & (b.missed.sum(axis=1) == 0.0))
                 known[key] = np.zeros(len(missed))
-                both = a.feasible & b.feasible
-                if both.any():
-                    gaps = meeting(_rows(a.ends, both), _rows(b.ends, both))[0]
-                    known[key][both] = self._missed_gap(lowest(gaps, int(both.sum())))
+                for c in _slices(len(both), CHUNK):
+                    i = both[c]
+                    (low,) = meeting(rows(a.ends, a.slot[i]), rows(b.ends, b.slot[i]))
+                    known[key][i] = self._missed_gap(low[0].min(axis=1))
             missed = np.maximum(missed, known[key])
         return missed
 
-    def _work_gap(self, X: np.ndarray) -> np.ndarray:
-        return lowest(self._work_height([c[:, None] for c in X.T], self._points)[0], len(X))  # type: ignore[operator]
+    def _lowest(self, gap: Callable[..., Any], X: np.ndarray) -> np.ndarray:
+        """Return the least of a gap over the seam for placements X (m, 3), shape (m,)."""
+        parts = [gap(X[c], self._points)[0][0].min(axis=1) for c in _slices(len(X), CHUNK)]
+        return np.concatenate(parts) if parts else np.empty(0)
 
     def _missed_gap(self, gap: np.ndarray) -> np.ndarray:
         limits = self.cell.constraints
         return np.maximum(0.0, limits.clearance_m + limits.clearance_margin_m - gap) / GAP_SCALE_M
 
     def _mmr(self, chosen: list[Side]) -> np.ndarray:
+        """Return the mean MMR of the candidates all chosen sides looked at, -inf for the others, shape (m,)."""
+        seen = np.flatnonzero(np.all([side.slot >= 0 for side in chosen], axis=0))
         tight = [s.coupling.kind == "tight" for s in self.cell.stations]
-        with np.errstate(all="ignore"):  # a stretched or folded arm may give 0/0; such a candidate is infeasible
-            value = mmr(self.cell.objective.reading, [s.w for s in chosen], [s.gram for s in chosen], tight).mean(
-                axis=1
-            )
-        return np.where(np.isfinite(value), value, -np.inf)
+        w, gram = ([getattr(side, name)[side.slot[seen]] for side in chosen] for name in ("w", "gram"))
+        objective = np.full(len(chosen[0].slot), -np.inf)
+        with np.errstate(all="ignore"):  # without a floor, w and gram may be zero
+            value = mmr(self.cell.objective.reading, w, gram, tight).mean(axis=1)
+        objective[seen] = np.where(np.isfinite(value), value, -np.inf)
+        return objective
 
 
 def allowed(choice: str, all_: dict[str, int]) -> list[str]:
@@ -154,17 +205,17 @@ def allowed(choice: str, all_: dict[str, int]) -> list[str]:
     return list(all_) if choice == "any" else [choice]
 
 
-def lowest(gaps: list[np.ndarray], m: int) -> np.ndarray:
-    """Return the smallest of all gaps over the points, shape (m,)."""
-    low = np.full(m, np.inf)
-    for gap in gaps:
-        np.minimum(low, np.min(gap, axis=1) if np.ndim(gap) == 2 else gap, out=low)
-    return low
+def _joined(parts: list[Lanes]) -> Lanes:
+    """Return lanes of several chunks of candidates as one."""
+    if len(parts) == 1:
+        return parts[0]
+    if isinstance(parts[0], np.ndarray):
+        return np.concatenate(parts, axis=1)
+    return [np.concatenate(same) for same in zip(*parts, strict=True)]
 
 
-def _rows(arrays: list[np.ndarray], mask: np.ndarray) -> list[np.ndarray]:
-    """Return the masked candidates of each array; arrays that do not depend on the candidate stay as they are."""
-    return [a[mask] if np.ndim(a) == 2 and len(a) == len(mask) else a for a in arrays]
+def _slices(count: int, size: int) -> Iterator[slice]:
+    return (slice(start, min(start + size, count)) for start in range(0, count, size))
 
 
 def _keep_better(best: Evaluation, objective: np.ndarray, missed: np.ndarray, mode: int) -> None:

@@ -1,13 +1,17 @@
 """Joint paths along the seam: from cosines and sines to continuous angles inside their limits."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from nlpweld.cell.robot import Robot
 
+Lanes = Sequence[np.ndarray] | np.ndarray
+Range = tuple[np.ndarray, np.ndarray]
 
-def joint_paths(robot: Robot, cos_sin: Sequence[np.ndarray]) -> np.ndarray:
+
+def joint_paths(robot: Robot, cos_sin: Lanes) -> np.ndarray:
     """Return continuous joint paths of the noflip wrist, closed by a repeat of the first point.
 
     Args:
@@ -17,7 +21,7 @@ def joint_paths(robot: Robot, cos_sin: Sequence[np.ndarray]) -> np.ndarray:
     Returns:
         q, shape (m, 6, N + 1) [rad], unwrapped along the last axis.
     """
-    cos, sin = np.stack(cos_sin[:6], axis=1), np.stack(cos_sin[6:], axis=1)
+    cos, sin = np.stack(list(cos_sin[:6]), axis=1), np.stack(list(cos_sin[6:]), axis=1)
     theta = np.arctan2(sin, cos)
     theta = np.concatenate([theta, theta[..., :1]], axis=-1)
     return np.unwrap(theta, axis=-1) - robot.dh[:, 3][:, None]
@@ -52,25 +56,71 @@ def limit_margins(robot: Robot, q: np.ndarray) -> np.ndarray:
     return np.minimum(upper - q.max(axis=-1), q.min(axis=-1) - lower)
 
 
-def on_best_wrist(
-    robot: Robot, q: np.ndarray, wrists: Sequence[str], need: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Joint limits and DH offsets of a robot as arrays, shape (n,) [rad]."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+    offset: np.ndarray
+
+    @staticmethod
+    def of(robot: Robot) -> "Limits":
+        """Return the limits of a robot."""
+        lower, upper = robot.limits_rad.T
+        return Limits(lower, upper, robot.dh[:, 3])
+
+
+def best_wrist(limits: Limits, cos_sin: Lanes, wrists: Sequence[str], need: float) -> tuple[np.ndarray, np.ndarray]:
     """Choose for each candidate the first allowed wrist that keeps a margin, or else the one that keeps most.
 
     Args:
-        robot: the robot.
-        q: noflip paths, shape (m, 6, M) [rad].
+        limits: of a six-axis robot.
+        cos_sin: twelve arrays (m, N): cosines, then sines, of the DH angles of the noflip wrist.
         wrists: allowed wrists in order of preference.
         need: joint margin that is enough [rad].
 
     Returns:
-        settled paths (m, 6, M) [rad], their worst joint margins (m,) [rad], and indices into ``wrists`` (m,).
+        worst joint margins of the chosen wrists (m,) [rad], negative outside, and their indices (m,).
     """
-    paths = np.stack([settle(robot, on_wrist(robot, q, wrist), need) for wrist in wrists])
-    margins = limit_margins(robot, paths).min(axis=-1)
+    ranges = [_range(limits, i, cos_sin[i], cos_sin[i + 6]) for i in range(6)]
+    common = np.min([_margin(limits, i, ranges[i], need) for i in range(3)], axis=0)
+    margins = np.stack([common] * len(wrists))
+    for margin, wrist in zip(margins, wrists, strict=True):
+        for i in range(3, 6):
+            turned = ranges[i] if wrist == "noflip" else _flipped(limits, i, ranges[i])
+            np.minimum(margin, _margin(limits, i, turned, need), out=margin)
     best = np.argmax(np.minimum(margins, need), axis=0)
-    rows = np.arange(len(q))
-    return paths[best, rows], margins[best, rows], best
+    return margins[best, np.arange(margins.shape[1])], best
+
+
+def _flipped(limits: Limits, i: int, reach: Range) -> Range:
+    """Return the range of wrist joint i (from 0) on the other wrist."""
+    low, high = reach
+    if i == 4:
+        return -high - 2 * limits.offset[4], -low - 2 * limits.offset[4]
+    return low + np.pi, high + np.pi
+
+
+def _margin(limits: Limits, i: int, reach: Range, need: float) -> np.ndarray:
+    """Return how far a range stays inside the limits of joint i (from 0), shifted by whole turns if it must."""
+    low, high = reach
+    as_is = np.minimum(limits.upper[i] - high, low - limits.lower[i])
+    turns = 2 * np.pi * np.round((limits.upper[i] + limits.lower[i] - low - high) / (4 * np.pi))
+    settled = np.minimum(limits.upper[i] - high - turns, low + turns - limits.lower[i])
+    return np.where(as_is >= need, as_is, settled)
+
+
+def _range(limits: Limits, i: int, cos: np.ndarray, sin: np.ndarray) -> Range:
+    """Return the least and greatest angle of joint i over closed paths (m, N), the way back included, (m,) each."""
+    theta = np.arctan2(sin, cos)
+    low, high = theta.min(axis=1), theta.max(axis=1)
+    jumping = np.flatnonzero(high - low > np.pi)  # a path that never spans half a turn has no cut to unwrap
+    if jumping.size:
+        closed = np.concatenate([theta[jumping], theta[jumping, :1]], axis=1)
+        path = np.unwrap(closed, axis=1)
+        low[jumping], high[jumping] = path.min(axis=1), path.max(axis=1)
+    return low - limits.offset[i], high - limits.offset[i]
 
 
 def on_wrist(robot: Robot, q: np.ndarray, wrist: str) -> np.ndarray:

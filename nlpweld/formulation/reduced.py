@@ -9,7 +9,7 @@ from nlpweld.cell.cell import Cell
 from nlpweld.formulation.batch import CONSTRAINTS, Batch, allowed
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.nlp import Nlp
-from nlpweld.formulation.paths import joint_paths, on_best_wrist
+from nlpweld.formulation.paths import Limits, best_wrist, joint_paths, on_wrist, settle
 from nlpweld.formulation.smooth import relaxation
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import WRIST, signs
@@ -62,11 +62,12 @@ class Unpacker:
             cos_sin, reach = self._solve(k, x, (shoulder, elbow))
             if reach.min() < 0.0:
                 return OutOfReach(cell, station.name, int(reach.argmin()))
-            q = joint_paths(station.robot, list(cos_sin[:, None, :]))
+            lanes = cos_sin[:, None, :]
             wrists = allowed(cell.configuration.wrist, WRIST)
             need = np.radians(cell.constraints.joint_margin_deg)
-            settled, _, best = on_best_wrist(station.robot, q, wrists, need)
-            paths[station.name], wrist = settled[0, :, :-1].T, wrists[best[0]]
+            wrist = wrists[best_wrist(Limits.of(station.robot), lanes, wrists, need)[1][0]]
+            q = settle(station.robot, on_wrist(station.robot, joint_paths(station.robot, lanes), wrist), need)
+            paths[station.name] = q[0, :, :-1].T
             branches[station.name] = (shoulder, elbow, wrist)
         return Plan(cell, np.asarray(x, dtype=float), seam_parameters(cell), paths, branches)
 

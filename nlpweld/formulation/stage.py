@@ -1,8 +1,10 @@
 """The stage: one seam point of the cell as a CasADi graph. Every solver, population or gradient, sees this physics.
 
-It comes in two kinds of parts. An *arm* graph per station goes from placement and seam point, for a given inverse
-kinematics branch, to joints, manipulability, body ends, and the distances that concern this robot alone
-(workpiece, floor). A *meeting* graph per pair of stations goes from two sets of body ends to their distances.
+It comes in parts. For each station a *grip* graph goes from placement and seam point, on a given inverse kinematics
+branch, to joints, manipulability and reach; a *limbs* graph goes on from the joints to the velocity ellipsoid, the
+ends of the bodies, and the distances that concern this robot alone (workpiece, floor); the *arm* graph is both. For
+each pair of stations a *meeting* graph goes from two sets of body ends to their distances. Parts let a population
+solver stop early: most candidates fail in the grip.
 """
 
 from dataclasses import dataclass
@@ -51,9 +53,19 @@ class Stage:
     cell: Cell
 
     @cached_property
+    def grips(self) -> tuple[ca.Function, ...]:
+        """One function per station: ``(x, point, branch) -> cos_sin (6, 2), w, reach``."""
+        return tuple(self._grip(station) for station in self.cell.stations)
+
+    @cached_property
+    def limbs(self) -> tuple[ca.Function, ...]:
+        """One function per station: ``(x, point, cos_sin) -> gram, ends (3, 2b), gaps``."""
+        return tuple(self._limbs(station) for station in self.cell.stations)
+
+    @cached_property
     def arms(self) -> tuple[ca.Function, ...]:
         """One function per station: ``(x, point, branch) -> cos_sin (6, 2), w, gram, reach, ends (3, 2b), gaps``."""
-        return tuple(self._arm(station) for station in self.cell.stations)
+        return tuple(self._arm(k) for k in range(len(self.cell.stations)))
 
     @cached_property
     def meetings(self) -> dict[tuple[int, int], ca.Function]:
@@ -72,29 +84,36 @@ class Stage:
         rods = workpiece_rods(self.cell, Frame(point.R_W_C, x))
         return ca.Function("workpiece_height", [x, point.vector], [ca.vertcat(*[rod.height() for rod in rods])])
 
-    def _arm(self, station: Station) -> ca.Function:
+    def _grip(self, station: Station) -> ca.Function:
         x, point, branch = ca.SX.sym("x", 3), weld_point(), ca.SX.sym("branch", 3)
-        T_W_C = Frame(point.R_W_C, x)
         arm = self._inverse(station)
-        found = arm.solve(flange_pose(station, T_W_C, point.p_C), branch)
-        links = Chain(station.robot).links(found.cos, found.sin, base_pose(station))
+        found = arm.solve(flange_pose(station, Frame(point.R_W_C, x), point.p_C), branch)
+        outputs = [ca.horzcat(found.cos, found.sin), arm.abs_det_jacobian(found), found.reach]
+        inputs = [x, point.vector, branch]
+        return _function(f"grip_{station.name}", inputs, outputs, ["x", "point", "branch"], ["cos_sin", "w", "reach"])
+
+    def _limbs(self, station: Station) -> ca.Function:
+        x, point, cos_sin = ca.SX.sym("x", 3), weld_point(), ca.SX.sym("cos_sin", len(station.robot.joints), 2)
+        links = Chain(station.robot).links(cos_sin[:, 0], cos_sin[:, 1], base_pose(station))
         tcp = links[-1] @ constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
         rods = {body.name: station_rod(station, body, links, tcp) for body in station.bodies}
-        works = {rod.name: rod for rod in workpiece_rods(self.cell, T_W_C)}
+        works = {rod.name: rod for rod in workpiece_rods(self.cell, Frame(point.R_W_C, x))}
         gaps = [
             rods[body].gap(works[other]) if other in works else rods[body].height()
             for _, body, other in self._solo_pairs(station)
         ]
-        outputs = [
-            ca.horzcat(found.cos, found.sin),
-            arm.abs_det_jacobian(found),
-            det_gram(jacobian_of(links, tcp.p)[0]),
-            found.reach,
-            ca.horzcat(*[end for rod in rods.values() for end in (rod.start, rod.end)]),
-            ca.vertcat(*gaps),
-        ]
-        inputs = [x, point.vector, branch]
-        return _function(f"arm_{station.name}", inputs, outputs, ["x", "point", "branch"], list(ARM_OUTPUTS))
+        ends = ca.horzcat(*[end for rod in rods.values() for end in (rod.start, rod.end)])
+        outputs = [det_gram(jacobian_of(links, tcp.p)[0]), ends, ca.vertcat(*gaps)]
+        inputs = [x, point.vector, cos_sin]
+        return _function(f"limbs_{station.name}", inputs, outputs, ["x", "point", "cos_sin"], ["gram", "ends", "gaps"])
+
+    def _arm(self, k: int) -> ca.Function:
+        x, point, branch = ca.SX.sym("x", 3), weld_point().vector, ca.SX.sym("branch", 3)
+        cos_sin, w, reach = self.grips[k](x, point, branch)
+        gram, ends, gaps = self.limbs[k](x, point, cos_sin)
+        outputs = [cos_sin, w, gram, reach, ends, gaps]
+        name = f"arm_{self.cell.stations[k].name}"
+        return _function(name, [x, point, branch], outputs, ["x", "point", "branch"], list(ARM_OUTPUTS))
 
     def _inverse(self, station: Station) -> SphericalArm:
         try:
@@ -165,6 +184,16 @@ def workpiece_rods(cell: Cell, T_W_C: Frame) -> list[Rod]:
 def stands_on_floor(body: Body) -> bool:
     """Tell whether a body is part of the base, which may be as near to the floor as it is."""
     return body.start.frame == body.end.frame == "link0"
+
+
+def with_lowest_gap(function: ca.Function) -> ca.Function:
+    """Return a stage function with its last output, the gaps, replaced by the least of them."""
+    inputs = [ca.SX.sym(function.name_in(i), *function.size_in(i)) for i in range(function.n_in())]
+    outputs = list(function.call(inputs))
+    names = [function.name_out(i) for i in range(function.n_out() - 1)]
+    return _function(
+        function.name(), inputs, [*outputs[:-1], ca.mmin(outputs[-1])], function.name_in(), [*names, "low"]
+    )
 
 
 def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX], ins: list[str], outs: list[str]) -> ca.Function:

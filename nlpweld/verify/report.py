@@ -157,7 +157,8 @@ class Report:
             cell=cell.name, at=_triple(at), n_points=n_points, reading=cell.objective.reading,
             mmr_mean=nan, mmr_min=nan, mmr_max=nan, m_tight_mean=nan, m_loose_mean=nan,
             manipulability_mean=each, manipulability_min=dict(each), singularity_min=dict(each),
-            clearance_m=nan, clearance_along_m=nan, closest_pair=None, closest_s=None, joint_margin_rad=nan, closure_m=nan, closure_rad=nan,
+            clearance_m=nan, clearance_along_m=nan, closest_pair=None, closest_s=None,
+            joint_margin_rad=nan, closure_m=nan, closure_rad=nan,
             samples=0, feasible=False, violations=worst_first(violations),
         )  # fmt: skip
 

@@ -22,7 +22,10 @@ def disc(radius: float = 0.5, peak: np.ndarray = PEAK, centre: tuple[float, floa
         miss = sharpness * (ca.sqrt(ca.sumsqr(x - middle) + 1e-12) - radius)
         value = ca.sumsqr(x - peak) + 3 * (ca.fmax(miss, 0) + ca.log1p(ca.exp(-ca.fabs(miss)))) / sharpness
         hessian, gradient = ca.hessian(value, x)
-        functions = [ca.Function(name, [x, sharpness], [out]) for name, out in zip("vgh", [value, gradient, hessian], strict=True)]
+        functions = [
+            ca.Function(name, [x, sharpness], [out])
+            for name, out in zip("vgh", [value, gradient, hessian], strict=True)
+        ]
         return Relaxation(*functions)
 
     box = np.ones(2)
