@@ -25,11 +25,11 @@ $(VENV)/.stamp-main: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/.stamp-test: $(VENV)/.stamp-main
-	$(INSTALL) --editable '.[test]'
+	$(INSTALL) --editable '.[test,fast]'
 	touch $@
 
 $(VENV)/.stamp-lint: $(VENV)/.stamp-main
-	$(INSTALL) --editable '.[test,lint]'
+	$(INSTALL) --editable '.[test,fast,lint]'
 	touch $@
 
 clean:

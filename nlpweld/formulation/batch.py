@@ -79,6 +79,11 @@ class Batch:
     def _points(self) -> np.ndarray:
         return point_data(self.cell, seam_parameters(self.cell))
 
+    @property
+    def has_jets(self) -> bool:
+        """Whether derivatives may come from jets on Numba."""
+        return self._compile.jets
+
     @cached_property
     def _joint_limits(self) -> list[Limits]:
         return [Limits.of(station.robot) for station in self.cell.stations]

@@ -26,11 +26,13 @@ class Engine:
 
     Attributes:
         kernel: turns a function and the kinds of its inputs into a kernel over lanes.
+        jets: whether Numba is there to differentiate by jets.
         block: candidates taken at once; NumPy's calls cost much, so it gathers the few that pass from many.
     """
 
     kernel: Callable[[ca.Function, tuple[str, ...]], Kernel]
     block: int
+    jets: bool
 
 
 def engine(name: str) -> Engine:
@@ -45,10 +47,10 @@ def engine(name: str) -> Engine:
     if name == "numba" and not installed:
         raise OptionError("engine 'numba' is not installed; bring it with: pip install 'nlpweld[fast]'")
     if name == "numpy" or not installed:
-        return Engine(numpy_kernel, 1024)
+        return Engine(numpy_kernel, 1024, jets=False)
     from nlpweld.formulation.numba_engine import numba_kernel
 
-    return Engine(numba_kernel, 64)
+    return Engine(numba_kernel, 64, jets=True)
 
 
 def numpy_kernel(function: ca.Function, kinds: tuple[str, ...]) -> Kernel:

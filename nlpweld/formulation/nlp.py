@@ -62,7 +62,8 @@ class Nlp:
         constraints: names of the columns of ``Evaluation.violation``.
         evaluate: exact model over candidates X (m, n).
         unpack: ``(x, mode) -> `` a Plan, or a report that says why there is none; None for toys.
-        relax: ``mode -> Relaxation``; None where there are no derivatives.
+        relax: ``(mode, whole) -> Relaxation``, with every constraint if whole, else with those likely to matter;
+            None where there are no derivatives.
         n_modes: number of discrete choices.
     """
 
@@ -74,11 +75,16 @@ class Nlp:
     constraints: tuple[str, ...]
     evaluate: Callable[[np.ndarray], Evaluation]
     unpack: Callable[[np.ndarray, int], Any] | None = None
-    relax: Callable[[int], Relaxation] | None = None
+    relax: Callable[[int, bool], Relaxation] | None = None
     n_modes: int = 1
 
     def starts(self, seed: int, count: int) -> np.ndarray:
         """Return start points in the box from a scrambled Sobol sequence, shape (count, n)."""
-        power = int(np.ceil(np.log2(count)))
-        unit = qmc.Sobol(len(self.lower), rng=np.random.default_rng(seed)).random_base2(power)[:count]
-        return qmc.scale(unit, self.lower, self.upper)
+        return sobol(self.lower, self.upper, seed, count)
+
+
+def sobol(lower: np.ndarray, upper: np.ndarray, seed: int, count: int) -> np.ndarray:
+    """Return points of a scrambled Sobol sequence in a box, shape (count, n)."""
+    power = int(np.ceil(np.log2(count)))
+    unit = qmc.Sobol(len(lower), rng=np.random.default_rng(seed)).random_base2(power)[:count]
+    return qmc.scale(unit, lower, upper)

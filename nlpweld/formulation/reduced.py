@@ -8,9 +8,9 @@ import numpy as np
 from nlpweld.cell.cell import Cell
 from nlpweld.formulation.batch import CONSTRAINTS, Batch, allowed
 from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.nlp import Nlp
+from nlpweld.formulation.nlp import Nlp, Relaxation, sobol
 from nlpweld.formulation.paths import Limits, best_wrist, joint_paths, on_wrist, settle
-from nlpweld.formulation.smooth import relaxation
+from nlpweld.formulation.smooth import near_gaps, relaxation
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import WRIST, signs
 from nlpweld.plan import Plan
@@ -43,9 +43,42 @@ def reduced(cell: Cell) -> Nlp:
         constraints=CONSTRAINTS,
         evaluate=batch.evaluate,
         unpack=Unpacker(batch),
-        relax=lambda mode: relaxation(batch.stage, batch.modes[mode]),
+        relax=Relaxer(batch),
         n_modes=len(batch.modes),
     )
+
+
+@dataclass(frozen=True)
+class Relaxer:
+    """Builds the smooth side of a cell for Ipopt and its kin.
+
+    Attributes:
+        batch: the exact model; it tells which bodies can come near each other.
+        scouts: placements looked at for that.
+        within_m: bodies that never come nearer than this at any scout are left out.
+        enough: scouts that must count, else nothing is left out.
+    """
+
+    batch: Batch
+    scouts: int = 512
+    within_m: float = 0.2
+    enough: int = 4
+
+    def __call__(self, mode: int, whole: bool = False) -> Relaxation:
+        """Return the relaxation on a mode's branches, with every distance if whole.
+
+        What is left out is a guess from a sample; the exact model, which leaves nothing out, judges the answer.
+        """
+        batch = self.batch
+        X = self._scouts(mode)
+        gaps = None if whole or len(X) < self.enough else near_gaps(batch.stage, batch.modes[mode], X, self.within_m)
+        return relaxation(batch.stage, batch.modes[mode], gaps, jets=batch.has_jets)
+
+    def _scouts(self, mode: int) -> np.ndarray:
+        """Return random placements on a mode that keep all but clearances, or nearly so, shape (m, 3) [m]."""
+        X = sobol(*self.batch.cell.box, seed=0, count=self.scouts)
+        found = self.batch.evaluate(X)
+        return X[np.isfinite(found.objective) & (found.mode == mode)]
 
 
 @dataclass(frozen=True)

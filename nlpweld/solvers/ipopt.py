@@ -11,6 +11,10 @@ from nlpweld.formulation.nlp import Nlp, Relaxation
 from nlpweld.solvers.base import Budget, Incumbent, Outcome
 
 
+# Each solve starts at the last one's answer, so the barrier of the box starts small and does not push it away.
+WARM = {"mu_init": 1e-6, "bound_push": 1e-6, "bound_frac": 1e-6}
+
+
 @dataclass(frozen=True)
 class Ipopt:
     """Interior-point solves of ever sharper penalties, each started from the last.
@@ -35,7 +39,7 @@ class Ipopt:
     sharpness: float = 30.0
     growth: float = 30.0
     sharpenings: int = 6
-    settled: float = 1e-4
+    settled: float = 1e-3
     hopeless: float = 1e-3
     descents: int = 10
     modes_tried: int = 3
@@ -65,6 +69,7 @@ class Ipopt:
                     return search.outcome(run.build_s, f"time limit in descent {tried}", timeout=True)
             if search.total == 0.0:
                 break
+            run.widen()
         return search.outcome(run.build_s, f"{run.last}; {tried} descents, {run.iterations} iterations")
 
     def _starts(self, search: Incumbent, seed: int) -> list[list[tuple[np.ndarray, int]]]:
@@ -95,11 +100,12 @@ class _Run:
     iterations: int = 0
     last: str = ""
     stopped: bool = False
-    built: dict[int, tuple[ca.Function, "_Watch"]] = field(default_factory=dict)  # nlpsol only borrows the watch
+    whole: bool = False  # a relaxation may leave constraints out until a descent ends infeasible
+    built: dict[int, tuple[ca.Function, "_Watch", Relaxation]] = field(default_factory=dict)  # nlpsol only borrows
 
     def descend(self, start: np.ndarray, mode: int) -> None:
         """Solve with growing sharpness from one start on one mode."""
-        solver, _ = self._solver(mode)
+        solver = self._solver(mode)
         x, before, sharpness = start, float("-inf"), self.options.sharpness
         for k in range(self.options.sharpenings):
             solution = solver(x0=x, p=sharpness, lbx=self.nlp.lower, ubx=self.nlp.upper)
@@ -117,14 +123,20 @@ class _Run:
             if k >= 2 and (settled or found.total[0] > self.options.hopeless):
                 return
 
-    def _solver(self, mode: int) -> tuple[ca.Function, "_Watch"]:
+    def widen(self) -> None:
+        """Leave no constraint out from now on."""
+        if not self.whole:
+            self.whole = True
+            self.built.clear()
+
+    def _solver(self, mode: int) -> ca.Function:
         if mode not in self.built:
             began = time.perf_counter()
             assert self.nlp.relax is not None
-            watch = _Watch(self)
-            self.built[mode] = (nlpsol(self.nlp.relax(mode), self.options, watch), watch)
+            watch, relax = _Watch(self), self.nlp.relax(mode, self.whole)
+            self.built[mode] = (nlpsol(relax, self.options, watch), watch, relax)
             self.build_s += time.perf_counter() - began
-        return self.built[mode]
+        return self.built[mode][0]
 
 
 class _Watch(ca.Callback):
@@ -168,9 +180,17 @@ def nlpsol(relax: Relaxation, options: Ipopt, watch: ca.Callback) -> ca.Function
     )
     settings = {
         "print_time": False,
+        "calc_lam_p": False,
+        "no_nlp_grad": True,  # it would differentiate what has derivatives of its own
         "grad_f": gradient,
         "hess_lag": hessian,
         "iteration_callback": watch,
-        "ipopt": {"print_level": 0, "sb": "yes", "tol": options.tol, "max_iter": options.max_iter},
+        "ipopt": {
+            "print_level": 0,
+            "sb": "yes",
+            "tol": options.tol,
+            "max_iter": options.max_iter,
+            **WARM,
+        },
     }
     return ca.nlpsol("ipopt", "ipopt", {"x": x, "p": p, "f": f}, settings)

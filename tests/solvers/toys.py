@@ -17,7 +17,7 @@ def disc(radius: float = 0.5, peak: np.ndarray = PEAK, centre: tuple[float, floa
         objective = -((X - peak) ** 2).sum(axis=1)
         return Evaluation(objective, outside[:, None], np.zeros(len(X), dtype=int))
 
-    def relax(mode: int) -> Relaxation:
+    def relax(mode: int, whole: bool) -> Relaxation:
         x, sharpness = ca.SX.sym("x", 2), ca.SX.sym("sharpness")
         miss = sharpness * (ca.sqrt(ca.sumsqr(x - middle) + 1e-12) - radius)
         value = ca.sumsqr(x - peak) + 3 * (ca.fmax(miss, 0) + ca.log1p(ca.exp(-ca.fabs(miss)))) / sharpness
