@@ -9,9 +9,9 @@ import pandas as pd
 from scipy.stats import qmc
 
 from nlpweld.cell import Cell
+from nlpweld.engine.numpy_kernels import lower
 from nlpweld.formulation.batch import CONSTRAINTS, Batch
 from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.lower import lower
 from nlpweld.formulation.nlp import Nlp
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from nlpweld.cell.cell import Cell
+from nlpweld.engine.choice import Engine, engine
+from nlpweld.engine.lanes import Lanes, joined, rows
 from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.engine import Engine, Lanes, engine, rows
 from nlpweld.formulation.nlp import Evaluation
 from nlpweld.formulation.paths import Limits, best_wrist
 from nlpweld.formulation.stage import Stage, with_lowest_gap
@@ -139,7 +140,7 @@ class Batch:
             nothing = np.empty((0, self._points.shape[1]))
             return Side(missed, slot, nothing, nothing, [])
         missed[near, 3] = self._missed_gap(np.concatenate([part[2][0].min(axis=1) for part in parts]))
-        return Side(missed, slot, w, _joined([part[0] for part in parts])[0], _joined([part[1] for part in parts]))
+        return Side(missed, slot, w, joined([part[0] for part in parts])[0], joined([part[1] for part in parts]))
 
     def _gripped(self, k: int, X: np.ndarray, branch: tuple[str, str]) -> tuple[Any, ...]:
         """Return missed (m, 4), the rows worth going on with (r,), and their w (r, N) and cos_sin, twelve (r, N)."""
@@ -156,7 +157,7 @@ class Batch:
             passed = np.flatnonzero((part[:, 0] == 0.0) & (part[:, 1] == 0.0) & (part[:, 2] < NEAR))
             near.append(passed + c.start)
             kept.append((w[passed], rows(cos_sin, passed)))
-        return missed, np.concatenate(near), np.concatenate([k[0] for k in kept]), _joined([k[1] for k in kept])
+        return missed, np.concatenate(near), np.concatenate([k[0] for k in kept]), joined([k[1] for k in kept])
 
     def _missed_joints(self, k: int, cos_sin: Lanes, reached: np.ndarray) -> np.ndarray:
         """Return by how many half turns the best wrist misses its joint limits, for candidates within reach."""
@@ -208,15 +209,6 @@ class Batch:
 def allowed(choice: str, all_: dict[str, int]) -> list[str]:
     """Return the branch names a configuration entry allows."""
     return list(all_) if choice == "any" else [choice]
-
-
-def _joined(parts: list[Lanes]) -> Lanes:
-    """Return lanes of several chunks of candidates as one."""
-    if len(parts) == 1:
-        return parts[0]
-    if isinstance(parts[0], np.ndarray):
-        return np.concatenate(parts, axis=1)
-    return [np.concatenate(same) for same in zip(*parts, strict=True)]
 
 
 def _slices(count: int, size: int) -> Iterator[slice]:

@@ -36,7 +36,7 @@ def _summed(name: str, inputs: list[ca.SX], output: ca.SX, data: ca.DM) -> ca.Fu
 
 def by_jets(term: ca.Function, points: np.ndarray) -> Relaxation:
     """Return the same by second-order jets: one pass gives all three, kept for the calls that follow at one point."""
-    from nlpweld.formulation.jets import summed_jet
+    from nlpweld.engine.jets import summed_jet
 
     jet = _Remembered(summed_jet(term, points))
     return Relaxation(
@@ -68,9 +68,7 @@ class _Remembered:
 class _Part(ca.Callback):
     """One part of a jet as a CasADi function ``(x, sharpness) -> part``; its owner must keep it alive."""
 
-    def __init__(
-        self, name: str, part: Callable[[np.ndarray, float], np.ndarray], shape: tuple[int, int]
-    ) -> None:
+    def __init__(self, name: str, part: Callable[[np.ndarray, float], np.ndarray], shape: tuple[int, int]) -> None:
         ca.Callback.__init__(self)
         self.part, self.shape = part, shape
         self.construct(name, {})

@@ -6,9 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nlpweld.cell.robot import Robot
-
-Lanes = Sequence[np.ndarray] | np.ndarray
-Range = tuple[np.ndarray, np.ndarray]
+from nlpweld.engine.lanes import Lanes
 
 
 def joint_paths(robot: Robot, cos_sin: Lanes) -> np.ndarray:
@@ -83,44 +81,42 @@ def best_wrist(limits: Limits, cos_sin: Lanes, wrists: Sequence[str], need: floa
     Returns:
         worst joint margins of the chosen wrists (m,) [rad], negative outside, and their indices (m,).
     """
-    ranges = [_range(limits, i, cos_sin[i], cos_sin[i + 6]) for i in range(6)]
-    common = np.min([_margin(limits, i, ranges[i], need) for i in range(3)], axis=0)
-    margins = np.stack([common] * len(wrists))
-    for margin, wrist in zip(margins, wrists, strict=True):
-        for i in range(3, 6):
-            turned = ranges[i] if wrist == "noflip" else _flipped(limits, i, ranges[i])
-            np.minimum(margin, _margin(limits, i, turned, need), out=margin)
+    low, high = _ranges(limits, np.asarray(cos_sin))
+    keeps = [_margins(limits, *_turned(limits, low, high, wrist), need).min(axis=0) for wrist in wrists]
+    margins = np.stack(keeps)
     best = np.argmax(np.minimum(margins, need), axis=0)
     return margins[best, np.arange(margins.shape[1])], best
 
 
-def _flipped(limits: Limits, i: int, reach: Range) -> Range:
-    """Return the range of wrist joint i (from 0) on the other wrist."""
-    low, high = reach
-    if i == 4:
-        return -high - 2 * limits.offset[4], -low - 2 * limits.offset[4]
-    return low + np.pi, high + np.pi
+def _turned(limits: Limits, low: np.ndarray, high: np.ndarray, wrist: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ranges (6, m) of noflip paths on the named wrist."""
+    if wrist == "noflip":
+        return low, high
+    other_low, other_high = low.copy(), high.copy()
+    other_low[3::2] += np.pi
+    other_high[3::2] += np.pi
+    other_low[4], other_high[4] = -high[4] - 2 * limits.offset[4], -low[4] - 2 * limits.offset[4]
+    return other_low, other_high
 
 
-def _margin(limits: Limits, i: int, reach: Range, need: float) -> np.ndarray:
-    """Return how far a range stays inside the limits of joint i (from 0), shifted by whole turns if it must."""
-    low, high = reach
-    as_is = np.minimum(limits.upper[i] - high, low - limits.lower[i])
-    turns = 2 * np.pi * np.round((limits.upper[i] + limits.lower[i] - low - high) / (4 * np.pi))
-    settled = np.minimum(limits.upper[i] - high - turns, low + turns - limits.lower[i])
-    return np.where(as_is >= need, as_is, settled)
+def _margins(limits: Limits, low: np.ndarray, high: np.ndarray, need: float) -> np.ndarray:
+    """Return how far ranges (6, m) stay inside the joint limits, shifted by whole turns if they must, (6, m)."""
+    lower, upper = limits.lower[:, None], limits.upper[:, None]
+    as_is = np.minimum(upper - high, low - lower)
+    turns = 2 * np.pi * np.round((upper + lower - low - high) / (4 * np.pi))
+    return np.where(as_is >= need, as_is, np.minimum(upper - high - turns, low + turns - lower))
 
 
-def _range(limits: Limits, i: int, cos: np.ndarray, sin: np.ndarray) -> Range:
-    """Return the least and greatest angle of joint i over closed paths (m, N), the way back included, (m,) each."""
-    theta = np.arctan2(sin, cos)
-    low, high = theta.min(axis=1), theta.max(axis=1)
-    jumping = np.flatnonzero(high - low > np.pi)  # a path that never spans half a turn has no cut to unwrap
-    if jumping.size:
-        closed = np.concatenate([theta[jumping], theta[jumping, :1]], axis=1)
-        path = np.unwrap(closed, axis=1)
+def _ranges(limits: Limits, cos_sin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return least and greatest joint angles over closed paths, cos_sin (12, m, N), the way back included, (6, m)."""
+    theta = np.arctan2(cos_sin[6:], cos_sin[:6])
+    low, high = theta.min(axis=2), theta.max(axis=2)
+    jumping = high - low > np.pi  # a path that never spans half a turn has no cut to unwrap
+    if jumping.any():
+        cut = theta[jumping]
+        path = np.unwrap(np.concatenate([cut, cut[:, :1]], axis=1), axis=1)
         low[jumping], high[jumping] = path.min(axis=1), path.max(axis=1)
-    return low - limits.offset[i], high - limits.offset[i]
+    return low - limits.offset[:, None], high - limits.offset[:, None]
 
 
 def on_wrist(robot: Robot, q: np.ndarray, wrist: str) -> np.ndarray:

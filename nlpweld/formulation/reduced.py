@@ -76,7 +76,8 @@ class Relaxer:
 
     def _scouts(self, mode: int) -> np.ndarray:
         """Return random placements on a mode that keep all but clearances, or nearly so, shape (m, 3) [m]."""
-        X = sobol(*self.batch.cell.box, seed=0, count=self.scouts)
+        lower, upper = self.batch.cell.box
+        X = sobol(lower, upper, 0, self.scouts)
         found = self.batch.evaluate(X)
         return X[np.isfinite(found.objective) & (found.mode == mode)]
 

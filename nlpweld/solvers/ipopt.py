@@ -10,7 +10,6 @@ import numpy as np
 from nlpweld.formulation.nlp import Nlp, Relaxation
 from nlpweld.solvers.base import Budget, Incumbent, Outcome
 
-
 # Each solve starts at the last one's answer, so the barrier of the box starts small and does not push it away.
 WARM = {"mu_init": 1e-6, "bound_push": 1e-6, "bound_frac": 1e-6}
 

@@ -14,35 +14,24 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from nlpweld.engine.lanes import ARITHMETIC, Kernel, Kinds, Lanes, lane_shape
 from nlpweld.errors import OutputError
-from nlpweld.formulation.engine import Kernel, Lanes, lane_shape
 from nlpweld.plan import write_text
 
-BINARY = {
-    ca.OP_ADD: "{0} + {1}",
-    ca.OP_SUB: "{0} - {1}",
-    ca.OP_MUL: "{0} * {1}",
-    ca.OP_DIV: "{0} / {1}",
+PATTERNS = {
+    **ARITHMETIC,
     ca.OP_FMIN: "min({0}, {1})",
     ca.OP_FMAX: "max({0}, {1})",
     ca.OP_LT: "1.0 * ({0} < {1})",
     ca.OP_LE: "1.0 * ({0} <= {1})",
     ca.OP_IF_ELSE_ZERO: "({1} if {0} != 0.0 else 0.0)",
-}
-UNARY = {
-    ca.OP_ASSIGN: "{0}",
-    ca.OP_NEG: "-{0}",
-    ca.OP_SQ: "{0} * {0}",
-    ca.OP_TWICE: "{0} + {0}",
-    ca.OP_INV: "1.0 / {0}",
-    ca.OP_SQRT: "sqrt({0})",
     ca.OP_FABS: "abs({0})",
     ca.OP_NOT: "1.0 * ({0} == 0.0)",
 }
 HEAD = "from math import sqrt\n\nimport numba\n\n\n"
 
 
-def numba_kernel(function: ca.Function, kinds: tuple[str, ...]) -> Kernel:
+def numba_kernel(function: ca.Function, kinds: Kinds) -> Kernel:
     """Return a kernel compiled by Numba on first use, or loaded from its cache."""
     compiled = load(source(function, kinds)).kernel
     sizes = [function.nnz_out(i) for i in range(function.n_out())]
@@ -61,7 +50,7 @@ def _array(given: Any) -> np.ndarray:
     return np.ascontiguousarray(given if isinstance(given, np.ndarray) else np.stack(given), dtype=float)
 
 
-def source(function: ca.Function, kinds: tuple[str, ...]) -> str:
+def source(function: ca.Function, kinds: Kinds) -> str:
     """Return the source text of a module with the kernel.
 
     Rows of inputs and outputs are taken out of the inner loop, which then runs over slices.
@@ -82,7 +71,7 @@ def source(function: ca.Function, kinds: tuple[str, ...]) -> str:
     return HEAD + "\n".join(lines) + "\n"
 
 
-def _body(f: ca.Function, kinds: tuple[str, ...]) -> list[str]:
+def _body(f: ca.Function, kinds: Kinds) -> list[str]:
     """Return the instructions as assignments to names used once, in the order of the list."""
     first = np.concatenate([[0], np.cumsum([f.nnz_out(k) for k in range(f.n_out())])])
     held: dict[int, str] = {}
@@ -96,9 +85,9 @@ def _body(f: ca.Function, kinds: tuple[str, ...]) -> list[str]:
         elif op == ca.OP_OUTPUT:
             lines.append(f"o{first[outs[0]] + outs[1]}[j] = {held[ins[0]]}")
         else:
-            pattern = BINARY.get(op) or UNARY.get(op)
+            pattern = PATTERNS.get(op)
             if pattern is None:
-                raise ValueError(f"{f.name()}: CasADi operation {op} has no Numba form; add it to the tables above")
+                raise ValueError(f"{f.name()}: CasADi operation {op} has no Numba form; add it to the table above")
             lines.append(f"t{k} = " + pattern.format(*(held[i] for i in ins)))
             held[outs[0]] = f"t{k}"
     return lines

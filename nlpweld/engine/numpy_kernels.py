@@ -6,11 +6,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-BINARY = {
-    ca.OP_ADD: "{0} + {1}",
-    ca.OP_SUB: "{0} - {1}",
-    ca.OP_MUL: "{0} * {1}",
-    ca.OP_DIV: "{0} / {1}",
+from nlpweld.engine.lanes import ARITHMETIC, Kernel, Kinds, Lanes, lane_shape
+
+PATTERNS = {
+    **ARITHMETIC,
     ca.OP_FMIN: "minimum({0}, {1})",
     ca.OP_FMAX: "maximum({0}, {1})",
     ca.OP_LT: "({0} < {1}) * 1.0",
@@ -21,14 +20,6 @@ BINARY = {
     ca.OP_POW: "{0} ** {1}",
     ca.OP_CONSTPOW: "{0} ** {1}",
     ca.OP_ATAN2: "arctan2({0}, {1})",
-}
-UNARY = {
-    ca.OP_ASSIGN: "{0}",
-    ca.OP_NEG: "-{0}",
-    ca.OP_SQ: "{0} * {0}",
-    ca.OP_TWICE: "{0} + {0}",
-    ca.OP_INV: "1.0 / {0}",
-    ca.OP_SQRT: "sqrt({0})",
     ca.OP_FABS: "absolute({0})",
     ca.OP_NOT: "({0} == 0) * 1.0",
     ca.OP_SIN: "sin({0})",
@@ -81,7 +72,27 @@ def _instruction(f: ca.Function, k: int) -> str:
         return f"w{outs[0]} = i{ins[0]}[{ins[1]}]"
     if op == ca.OP_OUTPUT:
         return f"o{outs[0]}[{outs[1]}] = w{ins[0]}"
-    pattern = BINARY.get(op) or UNARY.get(op)
+    pattern = PATTERNS.get(op)
     if pattern is None:
-        raise ValueError(f"{f.name()}: CasADi operation {op} has no NumPy form; add it to the tables above")
+        raise ValueError(f"{f.name()}: CasADi operation {op} has no NumPy form; add it to the table above")
     return f"w{outs[0]} = " + pattern.format(*(f"w{i}" for i in ins))
+
+
+def numpy_kernel(function: ca.Function, kinds: Kinds) -> Kernel:
+    """Return a kernel in NumPy; what depends only on points or candidates is computed once for each."""
+    lowered = lower(function)
+
+    def kernel(*inputs: Any) -> tuple[Lanes, ...]:
+        shape = lane_shape(kinds, inputs)
+        outputs = lowered(*(SHAPED[kind](given) for kind, given in zip(kinds, inputs, strict=True)))
+        return tuple([np.broadcast_to(value, shape) for value in output] for output in outputs)
+
+    return kernel
+
+
+SHAPED: dict[str, Callable[[Any], Any]] = {
+    "candidate": lambda X: [column[:, None] for column in X.T],
+    "point": lambda D: [row[None, :] for row in D],
+    "lane": lambda lanes: lanes,
+    "number": lambda numbers: [float(n) for n in numbers],
+}

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from nlpweld.cell import Cell
+from nlpweld.engine.jets import summed_jet
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.derivatives import by_casadi, by_jets
-from nlpweld.formulation.jets import summed_jet
 from nlpweld.formulation.smooth import all_gaps, relaxation, term_function
 from nlpweld.formulation.stage import Stage
 from nlpweld.geometry.seam import seam_parameters

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from nlpweld.cell import Cell
+from nlpweld.engine import choice, numba_kernels
+from nlpweld.engine.choice import engine
+from nlpweld.engine.numpy_kernels import numpy_kernel
 from nlpweld.errors import OptionError, OutputError
-from nlpweld.formulation import engine as engine_module
-from nlpweld.formulation import numba_engine
 from nlpweld.formulation.batch import Batch
 from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.engine import engine
 from nlpweld.formulation.stage import Stage
 from nlpweld.geometry.seam import seam_parameters
 
@@ -25,7 +25,9 @@ def placements(cell: Cell) -> np.ndarray:
     X = rng.uniform(*cell.box, (RANDOM // 72, 3))
     X[::5] += rng.choice([-3.0, 3.0], X[::5].shape)
     bases = np.array([station.base_position_m for station in cell.stations])
-    edges = [base + [0, 0, dz] for base in bases for dz in (0.0, 0.412, 0.9)]  # on axis 1, at the shoulder, above
+    edges = [
+        base + np.array([0, 0, dz]) for base in bases for dz in (0.0, 0.412, 0.9)
+    ]  # on axis 1, at the shoulder, above
     stretched = [bases[2] - [0, 2.02, -1.0], bases[2] - [0, 2.0201, -1.0]]
     return np.vstack([X, edges, stretched])
 
@@ -75,7 +77,7 @@ def _assert_same(got: tuple, want: tuple, shape: tuple[int, int]) -> None:
 def test_engines_judge_candidates_alike(cell: Cell, branches: str) -> None:
     own = cell if branches == "front" else cell.with_(configuration={"shoulder": "any", "elbow": "any"})
     rng = np.random.default_rng(12)
-    X = np.vstack([rng.uniform(*cell.box, (150, 3)), [0.0, -0.17, 0.4] + rng.normal(0, 0.02, (50, 3))])
+    X = np.vstack([rng.uniform(*cell.box, (150, 3)), rng.normal([0.0, -0.17, 0.4], 0.02, (50, 3))])
     ours, theirs = (Batch(own, name).evaluate(X) for name in NAMES)
     assert ours.violation == pytest.approx(theirs.violation, abs=1e-12)
     assert ours.objective == pytest.approx(theirs.objective, rel=1e-12)
@@ -88,8 +90,8 @@ def test_unknown_engine_lists_those_there_are() -> None:
 
 
 def test_numba_that_is_not_installed_is_told_with_the_command_that_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine_module, "find_spec", lambda name: None)
-    assert engine("auto").kernel is engine_module.numpy_kernel
+    monkeypatch.setattr(choice, "find_spec", lambda name: None)
+    assert engine("auto").kernel is numpy_kernel
     with pytest.raises(OptionError, match=r"pip install 'nlpweld\[fast\]'"):
         engine("numba")
 
@@ -98,12 +100,12 @@ def test_kernels_are_written_once_and_an_unwritable_cache_names_the_way_out(tmp_
     x = ca.SX.sym("x", 2)
     f = ca.Function("f", [x], [x[0] * 3.25 + x[1]])
     monkeypatch.setenv("NLPWELD_CACHE", str(tmp_path / "cache"))
-    X = np.arange(6.0).reshape(1, 2, 3) + [[[0]], [[1]]]
-    kernel = numba_engine.numba_kernel(f, ("lane",))
-    assert kernel(X[0:1].repeat(2, axis=0))[0].shape == (1, 2, 3)
+    X = np.arange(12.0).reshape(2, 2, 3)
+    ((got,),) = numba_kernels.numba_kernel(f, ("lane",))(X)
+    assert (got == 3.25 * X[0] + X[1]).all()
     assert len(list((tmp_path / "cache").glob("*.py"))) == 1
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("NLPWELD_CACHE", str(tmp_path / "file" / "cache"))
     g = ca.Function("g", [x], [x[0] * 4.25 + x[1]])
     with pytest.raises(OutputError, match="NLPWELD_CACHE"):
-        numba_engine.numba_kernel(g, ("lane",))
+        numba_kernels.numba_kernel(g, ("lane",))

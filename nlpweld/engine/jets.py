@@ -72,7 +72,7 @@ def tape(f: ca.Function) -> Tape:
             result = op not in FLAT and bool(alive[a] or uses_b)
             active[k], alive[outs[0]] = (result, alive[a], uses_b), result
         else:
-            raise ValueError(f"{f.name()}: CasADi operation {op} has no jet; add it to nlpweld/formulation/jets.py")
+            raise ValueError(f"{f.name()}: CasADi operation {op} has no jet; add it to nlpweld/engine/jets.py")
     return Tape(code, active, constants, f.sz_w())
 
 

@@ -1,0 +1,1 @@
+"""Ways to run CasADi functions over arrays: it knows graphs and numbers, and nothing of robots."""
