@@ -40,8 +40,10 @@ def lane_shape(kinds: Kinds, inputs: tuple[Any, ...]) -> tuple[int, int]:
 
 
 def rows(lanes: Lanes, which: Any) -> Lanes:
-    """Return some candidates of lanes, by slice, index or mask."""
-    return lanes[:, which] if isinstance(lanes, np.ndarray) else [lane[which] for lane in lanes]
+    """Return some candidates of lanes, by slice, index or mask; arrays keep a candidate's numbers together."""
+    if isinstance(lanes, np.ndarray):
+        return lanes.transpose(1, 0, 2)[which].transpose(1, 0, 2)
+    return [lane[which] for lane in lanes]
 
 
 def joined(parts: list[Lanes]) -> Lanes:
@@ -49,5 +51,5 @@ def joined(parts: list[Lanes]) -> Lanes:
     if len(parts) == 1:
         return parts[0]
     if isinstance(parts[0], np.ndarray):
-        return np.concatenate(parts, axis=1)
+        return np.concatenate([np.asarray(part).transpose(1, 0, 2) for part in parts]).transpose(1, 0, 2)
     return [np.concatenate(same) for same in zip(*parts, strict=True)]

@@ -32,48 +32,60 @@ HEAD = "from math import sqrt\n\nimport numba\n\n\n"
 
 
 def numba_kernel(function: ca.Function, kinds: Kinds) -> Kernel:
-    """Return a kernel compiled by Numba on first use, or loaded from its cache."""
-    compiled = load(source(function, kinds)).kernel
+    """Return a kernel that Numba compiles on first use for a number of points, or loads from its cache."""
     sizes = [function.nnz_out(i) for i in range(function.n_out())]
     ends = np.cumsum(sizes)
+    compiled: dict[int, Any] = {}
 
     def kernel(*inputs: Any) -> tuple[Lanes, ...]:
         m, n = lane_shape(kinds, inputs)
-        out = np.empty((int(ends[-1]), m, n))
-        compiled(*(_array(given) for given in inputs), out)
-        return tuple(out[end - size : end] for size, end in zip(sizes, ends, strict=True))
+        if n not in compiled:
+            compiled[n] = load(source(function, kinds, n)).kernel
+        out = np.empty((m, int(ends[-1]), n))
+        compiled[n](*(_flat(given, kind) for given, kind in zip(inputs, kinds, strict=True)), out.reshape(-1))
+        lanes = out.transpose(1, 0, 2)
+        return tuple(lanes[end - size : end] for size, end in zip(sizes, ends, strict=True))
 
     return kernel
 
 
-def _array(given: Any) -> np.ndarray:
-    return np.ascontiguousarray(given if isinstance(given, np.ndarray) else np.stack(given), dtype=float)
+def _flat(given: Any, kind: str) -> np.ndarray:
+    """Return an input as one row of numbers; lanes candidate by candidate, as kernels write them."""
+    if kind == "lane":
+        given = (given if isinstance(given, np.ndarray) else np.stack(given)).transpose(1, 0, 2)
+    return np.ascontiguousarray(given, dtype=float).reshape(-1)
 
 
-def source(function: ca.Function, kinds: Kinds) -> str:
-    """Return the source text of a module with the kernel.
+def source(function: ca.Function, kinds: Kinds, n: int) -> str:
+    """Return the source text of a module with the kernel for n seam points.
 
-    Rows of inputs and outputs are taken out of the inner loop, which then runs over slices.
+    Everything a candidate reads and writes is one slice with the number of points as a literal: offsets known when
+    compiling let LLVM see that nothing overlaps, without which it does not vectorise a loop with many outputs.
     """
     names = [f"i{k}" for k in range(function.n_in())]
+    count = sum(function.nnz_out(k) for k in range(function.n_out()))
     lines = [
         "@numba.njit(error_model='numpy', cache=True)",
         f"def kernel({', '.join(names)}, out):",
-        "    for i in range(out.shape[1]):",
+        f"    for i in range(out.size // {count * n}):",
+        f"        o = out[i * {count * n} : (i + 1) * {count * n}]",
     ]
-    row = {"candidate": "{0}[i, {1}]", "point": "{0}[{1}]", "lane": "{0}[{1}, i]", "number": "{0}[{1}]"}
     for k, (name, kind) in enumerate(zip(names, kinds, strict=True)):
-        lines += [f"        {name}_{j} = {row[kind].format(name, j)}" for j in range(function.nnz_in(k))]
-    count = sum(function.nnz_out(k) for k in range(function.n_out()))
-    lines += [f"        o{j} = out[{j}, i]" for j in range(count)]
-    lines.append("        for j in range(out.shape[2]):")
-    lines += [f"            {line}" for line in _body(function, kinds)]
+        size = function.nnz_in(k)
+        if kind == "lane":
+            lines.append(f"        {name}_ = {name}[i * {size * n} : (i + 1) * {size * n}]")
+        elif kind != "point":
+            first = f"i * {size} + " if kind == "candidate" else ""
+            lines += [f"        {name}_{j} = {name}[{first}{j}]" for j in range(size)]
+    lines.append(f"        for j in range({n}):")
+    lines += [f"            {line}" for line in _body(function, kinds, n)]
     return HEAD + "\n".join(lines) + "\n"
 
 
-def _body(f: ca.Function, kinds: Kinds) -> list[str]:
+def _body(f: ca.Function, kinds: Kinds, n: int) -> list[str]:
     """Return the instructions as assignments to names used once, in the order of the list."""
     first = np.concatenate([[0], np.cumsum([f.nnz_out(k) for k in range(f.n_out())])])
+    read = {"candidate": "i{0}_{1}", "number": "i{0}_{1}", "point": "i{0}[j + {2}]", "lane": "i{0}_[j + {2}]"}
     held: dict[int, str] = {}
     lines = []
     for k in range(f.n_instructions()):
@@ -81,9 +93,9 @@ def _body(f: ca.Function, kinds: Kinds) -> list[str]:
         if op == ca.OP_CONST:
             held[outs[0]] = f"({f.instruction_constant(k)!r})"
         elif op == ca.OP_INPUT:
-            held[outs[0]] = f"i{ins[0]}_{ins[1]}" + ("[j]" if kinds[ins[0]] in ("point", "lane") else "")
+            held[outs[0]] = read[kinds[ins[0]]].format(ins[0], ins[1], ins[1] * n)
         elif op == ca.OP_OUTPUT:
-            lines.append(f"o{first[outs[0]] + outs[1]}[j] = {held[ins[0]]}")
+            lines.append(f"o[j + {(first[outs[0]] + outs[1]) * n}] = {held[ins[0]]}")
         else:
             pattern = PATTERNS.get(op)
             if pattern is None:

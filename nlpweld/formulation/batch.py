@@ -22,7 +22,6 @@ from nlpweld.kinematics.manipulability import mmr
 CONSTRAINTS = ("reach", "joint_limit", "singularity", "clearance")
 GAP_SCALE_M = 0.1  # a clearance missed by this much counts as one
 NEAR = 0.1  # share of the singularity floor that may lack for a candidate to be looked at any further
-CHUNK = 32  # candidates whose arrays fit the cache together
 
 
 @dataclass(eq=False)
@@ -83,36 +82,36 @@ class Batch:
     @property
     def has_jets(self) -> bool:
         """Whether derivatives may come from jets on Numba."""
-        return self._compile.jets
+        return self._engine.jets
 
     @cached_property
     def _joint_limits(self) -> list[Limits]:
         return [Limits.of(station.robot) for station in self.cell.stations]
 
     @cached_property
-    def _compile(self) -> Engine:
+    def _engine(self) -> Engine:
         return engine(self.engine)
 
     @cached_property
     def _grips(self) -> list[Callable[..., Any]]:
-        return [self._compile.kernel(grip, ("candidate", "point", "number")) for grip in self.stage.grips]
+        return [self._engine.kernel(grip, ("candidate", "point", "number")) for grip in self.stage.grips]
 
     @cached_property
     def _limbs(self) -> list[Callable[..., Any]]:
-        return [self._compile.kernel(with_lowest_gap(f), ("candidate", "point", "lane")) for f in self.stage.limbs]
+        return [self._engine.kernel(with_lowest_gap(f), ("candidate", "point", "lane")) for f in self.stage.limbs]
 
     @cached_property
     def _meetings(self) -> dict[tuple[int, int], Callable[..., Any]]:
-        return {p: self._compile.kernel(with_lowest_gap(f), ("lane", "lane")) for p, f in self.stage.meetings.items()}
+        return {p: self._engine.kernel(with_lowest_gap(f), ("lane", "lane")) for p, f in self.stage.meetings.items()}
 
     @cached_property
     def _height(self) -> Callable[..., Any]:
-        return self._compile.kernel(with_lowest_gap(self.stage.workpiece_height), ("candidate", "point"))
+        return self._engine.kernel(with_lowest_gap(self.stage.workpiece_height), ("candidate", "point"))
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X, shape (m, 3) [m]."""
         X = np.atleast_2d(np.asarray(X, dtype=float))
-        parts = [self._block(X[block]) for block in _slices(len(X), self._compile.block)]
+        parts = [self._block(X[block]) for block in _slices(len(X), self._engine.block)]
         return Evaluation(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("objective", "violation", "mode")))
 
     def _block(self, X: np.ndarray) -> Evaluation:
@@ -135,7 +134,9 @@ class Batch:
         missed, near, w, cos_sin = self._gripped(k, X, branch)
         slot = np.full(len(X), -1)
         slot[near] = np.arange(len(near))
-        parts = [self._limbs[k](X[near[c]], self._points, rows(cos_sin, c)) for c in _slices(len(near), CHUNK)]
+        parts = [
+            self._limbs[k](X[near[c]], self._points, rows(cos_sin, c)) for c in _slices(len(near), self._engine.chunk)
+        ]
         if not parts:
             nothing = np.empty((0, self._points.shape[1]))
             return Side(missed, slot, nothing, nothing, [])
@@ -148,7 +149,7 @@ class Batch:
         limits = self.cell.constraints
         floor = limits.singularity_floor_m3 + limits.singularity_margin_m3
         missed, near, kept = np.zeros((len(X), 4)), [], []
-        for c in _slices(len(X), CHUNK):
+        for c in _slices(len(X), self._engine.chunk):
             cos_sin, (w,), (reach,) = self._grips[k](X[c], self._points, signs)
             part = missed[c]
             part[:, 0] = np.maximum(0.0, -reach.min(axis=1))
@@ -156,7 +157,7 @@ class Batch:
             part[:, 2] = np.maximum(0.0, floor - w.min(axis=1)) / (floor or 1.0)
             passed = np.flatnonzero((part[:, 0] == 0.0) & (part[:, 1] == 0.0) & (part[:, 2] < NEAR))
             near.append(passed + c.start)
-            kept.append((w[passed], rows(cos_sin, passed)))
+            kept.append((w[passed], _picked(cos_sin, passed)))
         return missed, np.concatenate(near), np.concatenate([k[0] for k in kept]), joined([k[1] for k in kept])
 
     def _missed_joints(self, k: int, cos_sin: Lanes, reached: np.ndarray) -> np.ndarray:
@@ -165,7 +166,7 @@ class Batch:
         if reached.any():
             need = np.radians(self.cell.constraints.joint_margin_deg)
             wrists = allowed(self.cell.configuration.wrist, WRIST)
-            margins, _ = best_wrist(self._joint_limits[k], rows(cos_sin, reached), wrists, need)
+            margins, _ = best_wrist(self._joint_limits[k], _picked(cos_sin, np.flatnonzero(reached)), wrists, need)
             missed[reached] = np.maximum(0.0, need - margins) / np.pi
         return missed
 
@@ -178,16 +179,16 @@ class Batch:
                 a, b = sides[k][choice[k]], sides[l][choice[l]]
                 both = np.flatnonzero((a.missed.sum(axis=1) == 0.0) & (b.missed.sum(axis=1) == 0.0))
                 known[key] = np.zeros(len(missed))
-                for c in _slices(len(both), CHUNK):
+                for c in _slices(len(both), self._engine.chunk):
                     i = both[c]
-                    (low,) = meeting(rows(a.ends, a.slot[i]), rows(b.ends, b.slot[i]))
+                    (low,) = meeting(_picked(a.ends, a.slot[i]), _picked(b.ends, b.slot[i]))
                     known[key][i] = self._missed_gap(low[0].min(axis=1))
             missed = np.maximum(missed, known[key])
         return missed
 
     def _lowest(self, gap: Callable[..., Any], X: np.ndarray) -> np.ndarray:
         """Return the least of a gap over the seam for placements X (m, 3), shape (m,)."""
-        parts = [gap(X[c], self._points)[0][0].min(axis=1) for c in _slices(len(X), CHUNK)]
+        parts = [gap(X[c], self._points)[0][0].min(axis=1) for c in _slices(len(X), self._engine.chunk)]
         return np.concatenate(parts) if parts else np.empty(0)
 
     def _missed_gap(self, gap: np.ndarray) -> np.ndarray:
@@ -209,6 +210,11 @@ class Batch:
 def allowed(choice: str, all_: dict[str, int]) -> list[str]:
     """Return the branch names a configuration entry allows."""
     return list(all_) if choice == "any" else [choice]
+
+
+def _picked(lanes: Lanes, index: np.ndarray) -> Lanes:
+    """Return candidates of lanes by rising index, without a copy where it names them all."""
+    return lanes if len(index) == len(lanes[0]) else rows(lanes, index)
 
 
 def _slices(count: int, size: int) -> Iterator[slice]:

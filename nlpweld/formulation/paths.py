@@ -114,8 +114,11 @@ def _ranges(limits: Limits, cos_sin: np.ndarray) -> tuple[np.ndarray, np.ndarray
     jumping = high - low > np.pi  # a path that never spans half a turn has no cut to unwrap
     if jumping.any():
         cut = theta[jumping]
-        path = np.unwrap(np.concatenate([cut, cut[:, :1]], axis=1), axis=1)
-        low[jumping], high[jumping] = path.min(axis=1), path.max(axis=1)
+        step = np.diff(cut, axis=1, append=cut[:, :1])
+        turns = 2 * np.pi * np.cumsum((step < -np.pi).astype(float) - (step > np.pi), axis=1)
+        end = cut[:, 0] + turns[:, -1]
+        cut[:, 1:] += turns[:, :-1]
+        low[jumping], high[jumping] = np.minimum(cut.min(axis=1), end), np.maximum(cut.max(axis=1), end)
     return low - limits.offset[:, None], high - limits.offset[:, None]
 
 

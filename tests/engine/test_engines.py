@@ -106,6 +106,6 @@ def test_kernels_are_written_once_and_an_unwritable_cache_names_the_way_out(tmp_
     assert len(list((tmp_path / "cache").glob("*.py"))) == 1
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("NLPWELD_CACHE", str(tmp_path / "file" / "cache"))
-    g = ca.Function("g", [x], [x[0] * 4.25 + x[1]])
+    kernel = numba_kernels.numba_kernel(ca.Function("g", [x], [x[0] * 4.25 + x[1]]), ("lane",))
     with pytest.raises(OutputError, match="NLPWELD_CACHE"):
-        numba_kernels.numba_kernel(g, ("lane",))
+        kernel(X)
