@@ -72,7 +72,7 @@ def evaluate(cell: Cell, at: tuple[float, float, float] | np.ndarray) -> Report:
         cell: the cell.
         at: origin of C in W [m].
     """
-    return evaluate_plan(reduced(cell), np.asarray(at, dtype=float))[1]
+    return evaluate_plan(reduced(cell, engine="numpy"), np.asarray(at, dtype=float))[1]
 
 
 def evaluate_plan(nlp: Nlp, x: np.ndarray, mode: int | None = None) -> tuple[Plan | None, Report]:

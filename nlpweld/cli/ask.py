@@ -55,12 +55,13 @@ def evaluate(
     cell: Cell, at: tuple[float, float, float] | None, placement: str | None, out: Path | None, json: bool
 ) -> int:
     """Print the report of one placement; 0 when feasible, 1 when not."""
-    from nlpweld.bench.answer import evaluate_plan, formulate
+    from nlpweld.bench.answer import evaluate_plan
+    from nlpweld.formulation.reduced import reduced
 
     x = np.array(_where(cell, at, placement))
     if out is not None:
         writable(out.parent)
-    plan, report = evaluate_plan(formulate(cell), x)
+    plan, report = evaluate_plan(reduced(cell, engine="numpy"), x)
     if plan is not None and out is not None:
         plan.save(out)
     if json:

@@ -6,7 +6,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.stats import qmc
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +84,8 @@ class Nlp:
 
 def sobol(lower: np.ndarray, upper: np.ndarray, seed: int, count: int) -> np.ndarray:
     """Return points of a scrambled Sobol sequence in a box, shape (count, n)."""
+    from scipy.stats import qmc  # half a second to import, and not everybody needs it
+
     power = int(np.ceil(np.log2(count)))
     unit = qmc.Sobol(len(lower), rng=np.random.default_rng(seed)).random_base2(power)[:count]
     return qmc.scale(unit, lower, upper)

@@ -31,9 +31,14 @@ class OutOfReach:
     point: int
 
 
-def reduced(cell: Cell) -> Nlp:
-    """Return the reduced form of a cell: variables are the origin of C in W [m] (Pan et al., the three genes)."""
-    batch = Batch(cell)
+def reduced(cell: Cell, engine: str = "auto") -> Nlp:
+    """Return the reduced form of a cell: variables are the origin of C in W [m] (Pan et al., the three genes).
+
+    Args:
+        cell: the cell.
+        engine: ``numpy``, ``numba`` or ``auto``; for a handful of candidates NumPy is ready sooner.
+    """
+    batch = Batch(cell, engine)
     return Nlp(
         problem=cell.name,
         formulation="reduced",

@@ -10,7 +10,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.integrate import lebedev_rule
 
 from nlpweld.cell.cell import Reading
 
@@ -88,6 +87,8 @@ def intersection_volume(jacobians: Sequence[np.ndarray], order: int = 131) -> fl
         jacobians: translational Jacobians, each (3, n).
         order: order of the Lebedev rule (131 is the largest there is).
     """
+    from scipy.integrate import lebedev_rule  # slow to import, and not needed for MMR
+
     points, weights = lebedev_rule(order)
     cores = [np.linalg.inv(J @ J.T) for J in jacobians]
     radii = [np.einsum("ip,ij,jp->p", points, core, points) ** -0.5 for core in cores]

@@ -108,14 +108,18 @@ class Incumbent:
         best = self.objective if self.total == 0.0 else float("nan")
         self.trace.append(Step(self.elapsed_s, self.evaluations, best, np.array(at), mean, spread))
 
-    def out_of(self, budget: Budget) -> bool:
-        """Tell whether the time is up."""
-        return budget.time_s is not None and self.elapsed_s >= budget.time_s
+    def spent(self, budget: Budget) -> str:
+        """Return which limit is reached, ``time limit`` or ``evaluation limit``, or nothing."""
+        if budget.time_s is not None and self.elapsed_s >= budget.time_s:
+            return "time limit"
+        if budget.evaluations is not None and self.evaluations >= budget.evaluations:
+            return "evaluation limit"
+        return ""
 
-    def outcome(self, build_s: float, message: str, timeout: bool = False) -> Outcome:
-        """Return the outcome of the search so far."""
+    def outcome(self, build_s: float, message: str) -> Outcome:
+        """Return the outcome of the search so far; a message that starts with ``time limit`` makes it a TIMEOUT."""
         feasible = self.total == 0.0
-        status: Status = "TIMEOUT" if timeout else "SOLVED" if feasible else "INFEASIBLE"
+        status: Status = "TIMEOUT" if message.startswith("time limit") else "SOLVED" if feasible else "INFEASIBLE"
         objective = self.objective if np.isfinite(self.objective) else float("nan")
         solve_s = self.elapsed_s - build_s
         return Outcome(

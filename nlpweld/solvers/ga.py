@@ -57,4 +57,4 @@ class Ga:
         build_s = time.perf_counter() - search.started
         stop = Stop(self.generations, self.mean_change, self.still)
         why = evolve(algorithm, search, seed, budget, stop, eliminate=self.eliminate)
-        return search.outcome(build_s, why, timeout=why == "time limit")
+        return search.outcome(build_s, why)

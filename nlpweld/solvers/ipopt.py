@@ -60,23 +60,23 @@ class Ipopt:
         search = Incumbent(nlp)
         run = _Run(nlp, self, search, budget)
         tried = 0
-        for group in self._starts(search, seed):
+        for group in self._starts(search, seed, budget):
             for start, mode in group:
                 tried += 1
                 run.descend(start, mode)
                 if run.stopped:
-                    return search.outcome(run.build_s, f"time limit in descent {tried}", timeout=True)
+                    return search.outcome(run.build_s, f"{run.stopped} in descent {tried}")
             if search.total == 0.0:
                 break
             run.widen()
         return search.outcome(run.build_s, f"{run.last}; {tried} descents, {run.iterations} iterations")
 
-    def _starts(self, search: Incumbent, seed: int) -> list[list[tuple[np.ndarray, int]]]:
+    def _starts(self, search: Incumbent, seed: int, budget: Budget) -> list[list[tuple[np.ndarray, int]]]:
         """Return groups of (start, mode); a group is followed whole, the next only if it brought nothing feasible."""
         nlp = search.nlp
         if self.scouts == 0 and nlp.n_modes == 1:
             return [[(start, 0)] for start in nlp.starts(seed, self.descents)]
-        X = nlp.starts(seed, self.scouts or self.descents)
+        X = nlp.starts(seed, self.scouts or self.descents)[: budget.evaluations]
         found = search.evaluate(X)
         order = np.lexsort((-found.objective, found.total))
         if nlp.n_modes == 1:
@@ -98,7 +98,7 @@ class _Run:
     build_s: float = 0.0
     iterations: int = 0
     last: str = ""
-    stopped: bool = False
+    stopped: str = ""
     whole: bool = False  # a relaxation may leave constraints out until a descent ends infeasible
     built: dict[int, tuple[ca.Function, "_Watch", Relaxation]] = field(default_factory=dict)  # nlpsol only borrows
 
@@ -115,8 +115,8 @@ class _Run:
             self.search.note(x)
             gain = float(found.objective[0]) - before
             before = float(found.objective[0])
-            if self.search.out_of(self.budget):
-                self.stopped = True
+            self.stopped = self.search.spent(self.budget)
+            if self.stopped:
                 return
             settled = found.feasible[0] and gain < self.options.settled * abs(before)
             if k >= 2 and (settled or found.total[0] > self.options.hopeless):
@@ -161,7 +161,7 @@ class _Watch(ca.Callback):
     def eval(self, arg: list[ca.DM]) -> list[float]:
         self.run.search.evaluations += 1
         self.run.search.note(np.array(arg[0]).ravel())
-        return [1.0 if self.run.search.out_of(self.run.budget) else 0.0]
+        return [1.0 if self.run.search.spent(self.run.budget) else 0.0]
 
 
 def nlpsol(relax: Relaxation, options: Ipopt, watch: ca.Callback) -> ca.Function:

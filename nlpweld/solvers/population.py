@@ -50,8 +50,8 @@ def evolve(algorithm: Algorithm, search: Incumbent, seed: int, budget: Budget, s
     algorithm.setup(problem, seed=seed, verbose=False, termination=("n_gen", stop.generations))
     mean, still = float("nan"), 0
     for _ in range(stop.generations):
-        if search.out_of(budget):
-            return "time limit"
+        if search.spent(budget):
+            return search.spent(budget)
         brood = algorithm.ask()
         if budget.evaluations is not None and search.evaluations + len(brood) > budget.evaluations:
             return "evaluation limit"

@@ -32,9 +32,8 @@ class RandomSearch:
         """Draw candidates until the budget is spent."""
         search, rng = Incumbent(nlp), np.random.default_rng(seed)
         wanted = self.candidates if budget.evaluations is None else budget.evaluations
-        while search.evaluations < wanted and not search.out_of(budget):
+        while search.evaluations < wanted and search.spent(budget) != "time limit":
             count = min(self.batch, wanted - search.evaluations)
             search.evaluate(rng.uniform(nlp.lower, nlp.upper, (count, len(nlp.lower))))
             search.note()
-        stopped = search.evaluations < wanted
-        return search.outcome(0.0, "time limit" if stopped else "all candidates drawn", timeout=stopped)
+        return search.outcome(0.0, "time limit" if search.evaluations < wanted else "all candidates drawn")

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+
 from benchmarks.candidates import SETS, candidates, copies
 from benchmarks.contenders import NEEDS, WHAT, contender, missing
 from benchmarks.naive import Naive
-
 from nlpweld.cell import Cell
 from nlpweld.formulation.batch import Batch
 from nlpweld.verify.bodies import body_table

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+
 from benchmarks.candidates import candidates, copies
 from benchmarks.contenders import contender
 from benchmarks.timing import Job, interleaved, ratio
-
 from nlpweld.cell import Cell
 
 LEAST = {"random": 60.0, "near": 100.0}  # half of what was measured, against loops that stop at a point out of reach
