@@ -10,7 +10,7 @@ from nlpweld.cell import Cell
 from nlpweld.formulation.batch import Batch
 from nlpweld.verify.bodies import body_table
 
-COUNT = {"random": 40, "near": 8, "full": 3}
+COUNT = {"random": 30, "near": 5, "full": 2}
 
 
 @pytest.fixture(scope="module")

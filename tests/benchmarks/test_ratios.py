@@ -8,8 +8,8 @@ from benchmarks.contenders import contender
 from benchmarks.timing import Job, interleaved, ratio
 from nlpweld.cell import Cell
 
-LEAST = {"random": 60.0, "near": 100.0}  # half of what was measured, against loops that stop at a point out of reach
-FEW = {"random": 24, "near": 3}
+LEAST = {"random": 80.0, "near": 100.0}  # half of what was measured, against loops that stop at a point out of reach
+FEW = {"random": 16, "near": 2}
 POPULATION = 480
 
 
