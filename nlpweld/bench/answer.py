@@ -1,6 +1,7 @@
 """One question, one answer: build the problem, solve it, and let the verifier have the last word."""
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -116,7 +117,12 @@ def solve(
     reason = chosen.unsuitable(nlp)
     if reason:
         return Answer(Outcome("SKIPPED", None, 0, float("nan"), 0, 0.0, 0.0, message=reason), None, None)
+    began = time.perf_counter()
+    if nlp.prepare:
+        nlp.prepare()
+    prepared_s = time.perf_counter() - began
     outcome = chosen.solve(nlp, seed=seed, budget=budget or Budget())
+    outcome = replace(outcome, build_s=prepared_s + outcome.build_s)
     if outcome.x is None:
         return Answer(outcome, None, None)
     return Answer(outcome, *evaluate_plan(nlp, outcome.x, outcome.mode))

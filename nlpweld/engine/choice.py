@@ -19,8 +19,9 @@ class Engine:
 
     Attributes:
         kernel: turns a function and the kinds of its inputs into a kernel over lanes.
-        block: candidates taken at once; NumPy's calls cost much, so it gathers the few that pass from many.
-        chunk: candidates in one call, whose arrays fit the cache together.
+        block: lanes (candidates times points) taken at once; NumPy's calls cost much, so it gathers the few
+            candidates that pass from many.
+        chunk: lanes in one call, whose arrays fit the cache together.
         jets: whether Numba is there to differentiate by jets.
     """
 
@@ -42,7 +43,7 @@ def engine(name: str) -> Engine:
     if name == "numba" and not installed:
         raise OptionError("engine 'numba' is not installed; bring it with: pip install 'nlpweld[fast]'")
     if name == "numpy" or not installed:
-        return Engine(numpy_kernel, block=1024, chunk=32, jets=False)
+        return Engine(numpy_kernel, block=75_000, chunk=2_400, jets=False)
     from nlpweld.engine.numba_kernels import numba_kernel
 
-    return Engine(numba_kernel, block=128, chunk=128, jets=True)
+    return Engine(numba_kernel, block=9_600, chunk=9_600, jets=True)

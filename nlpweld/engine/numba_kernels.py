@@ -34,17 +34,16 @@ HEAD = "from math import sqrt\n\nimport numba\n\n\n"
 def numba_kernel(function: ca.Function, kinds: Kinds) -> Kernel:
     """Return a kernel that Numba compiles on first use for a number of points, or loads from its cache."""
     sizes = [function.nnz_out(i) for i in range(function.n_out())]
-    ends = np.cumsum(sizes)
     compiled: dict[int, Any] = {}
 
     def kernel(*inputs: Any) -> tuple[Lanes, ...]:
         m, n = lane_shape(kinds, inputs)
         if n not in compiled:
             compiled[n] = load(source(function, kinds, n)).kernel
-        out = np.empty((m, int(ends[-1]), n))
-        compiled[n](*(_flat(given, kind) for given, kind in zip(inputs, kinds, strict=True)), out.reshape(-1))
-        lanes = out.transpose(1, 0, 2)
-        return tuple(lanes[end - size : end] for size, end in zip(sizes, ends, strict=True))
+        outputs = [np.empty((m, size, n)) for size in sizes]
+        given = [_flat(each, kind) for each, kind in zip(inputs, kinds, strict=True)]
+        compiled[n](m, *given, *(out.reshape(-1) for out in outputs))
+        return tuple(out.transpose(1, 0, 2) for out in outputs)
 
     return kernel
 
@@ -63,12 +62,12 @@ def source(function: ca.Function, kinds: Kinds, n: int) -> str:
     compiling let LLVM see that nothing overlaps, without which it does not vectorise a loop with many outputs.
     """
     names = [f"i{k}" for k in range(function.n_in())]
-    count = sum(function.nnz_out(k) for k in range(function.n_out()))
+    outs = [function.nnz_out(k) * n for k in range(function.n_out())]
     lines = [
         "@numba.njit(error_model='numpy', cache=True)",
-        f"def kernel({', '.join(names)}, out):",
-        f"    for i in range(out.size // {count * n}):",
-        f"        o = out[i * {count * n} : (i + 1) * {count * n}]",
+        f"def kernel(m, {', '.join(names + [f'o{k}' for k in range(len(outs))])}):",
+        "    for i in range(m):",
+        *(f"        o{k}_ = o{k}[i * {size} : (i + 1) * {size}]" for k, size in enumerate(outs)),
     ]
     for k, (name, kind) in enumerate(zip(names, kinds, strict=True)):
         size = function.nnz_in(k)
@@ -84,7 +83,6 @@ def source(function: ca.Function, kinds: Kinds, n: int) -> str:
 
 def _body(f: ca.Function, kinds: Kinds, n: int) -> list[str]:
     """Return the instructions as assignments to names used once, in the order of the list."""
-    first = np.concatenate([[0], np.cumsum([f.nnz_out(k) for k in range(f.n_out())])])
     read = {"candidate": "i{0}_{1}", "number": "i{0}_{1}", "point": "i{0}[j + {2}]", "lane": "i{0}_[j + {2}]"}
     held: dict[int, str] = {}
     lines = []
@@ -95,7 +93,7 @@ def _body(f: ca.Function, kinds: Kinds, n: int) -> list[str]:
         elif op == ca.OP_INPUT:
             held[outs[0]] = read[kinds[ins[0]]].format(ins[0], ins[1], ins[1] * n)
         elif op == ca.OP_OUTPUT:
-            lines.append(f"o[j + {(first[outs[0]] + outs[1]) * n}] = {held[ins[0]]}")
+            lines.append(f"o{outs[0]}_[j + {outs[1] * n}] = {held[ins[0]]}")
         else:
             pattern = PATTERNS.get(op)
             if pattern is None:

@@ -93,6 +93,24 @@ class Batch:
         return engine(self.engine)
 
     @cached_property
+    def _chunk(self) -> int:
+        return self._candidates(self._engine.chunk)
+
+    def _candidates(self, lanes: int) -> int:
+        """Return how many candidates make so many lanes."""
+        return max(1, lanes // self._points.shape[1])
+
+    def prepare(self) -> None:
+        """Build, compile and run everything once, so that what follows measures evaluation alone."""
+        X, signs = self.cell.box.mean(axis=0)[None], np.ones(3)
+        ends = []
+        for grip, limbs in zip(self._grips, self._limbs, strict=True):
+            ends.append(limbs(X, self._points, grip(X, self._points, signs)[0])[1])
+        for (k, l), meeting in self._meetings.items():
+            meeting(ends[k], ends[l])
+        self._lowest(self._height, X)
+
+    @cached_property
     def _grips(self) -> list[Callable[..., Any]]:
         return [self._engine.kernel(grip, ("candidate", "point", "number")) for grip in self.stage.grips]
 
@@ -111,7 +129,7 @@ class Batch:
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X, shape (m, 3) [m]."""
         X = np.atleast_2d(np.asarray(X, dtype=float))
-        parts = [self._block(X[block]) for block in _slices(len(X), self._engine.block)]
+        parts = [self._block(X[block]) for block in _slices(len(X), self._candidates(self._engine.block))]
         return Evaluation(*(np.concatenate([getattr(p, f) for p in parts]) for f in ("objective", "violation", "mode")))
 
     def _block(self, X: np.ndarray) -> Evaluation:
@@ -134,9 +152,7 @@ class Batch:
         missed, near, w, cos_sin = self._gripped(k, X, branch)
         slot = np.full(len(X), -1)
         slot[near] = np.arange(len(near))
-        parts = [
-            self._limbs[k](X[near[c]], self._points, rows(cos_sin, c)) for c in _slices(len(near), self._engine.chunk)
-        ]
+        parts = [self._limbs[k](X[near[c]], self._points, rows(cos_sin, c)) for c in _slices(len(near), self._chunk)]
         if not parts:
             nothing = np.empty((0, self._points.shape[1]))
             return Side(missed, slot, nothing, nothing, [])
@@ -149,7 +165,7 @@ class Batch:
         limits = self.cell.constraints
         floor = limits.singularity_floor_m3 + limits.singularity_margin_m3
         missed, near, kept = np.zeros((len(X), 4)), [], []
-        for c in _slices(len(X), self._engine.chunk):
+        for c in _slices(len(X), self._chunk):
             cos_sin, (w,), (reach,) = self._grips[k](X[c], self._points, signs)
             part = missed[c]
             part[:, 0] = np.maximum(0.0, -reach.min(axis=1))
@@ -179,7 +195,7 @@ class Batch:
                 a, b = sides[k][choice[k]], sides[l][choice[l]]
                 both = np.flatnonzero((a.missed.sum(axis=1) == 0.0) & (b.missed.sum(axis=1) == 0.0))
                 known[key] = np.zeros(len(missed))
-                for c in _slices(len(both), self._engine.chunk):
+                for c in _slices(len(both), self._chunk):
                     i = both[c]
                     (low,) = meeting(_picked(a.ends, a.slot[i]), _picked(b.ends, b.slot[i]))
                     known[key][i] = self._missed_gap(low[0].min(axis=1))
@@ -188,7 +204,7 @@ class Batch:
 
     def _lowest(self, gap: Callable[..., Any], X: np.ndarray) -> np.ndarray:
         """Return the least of a gap over the seam for placements X (m, 3), shape (m,)."""
-        parts = [gap(X[c], self._points)[0][0].min(axis=1) for c in _slices(len(X), self._engine.chunk)]
+        parts = [gap(X[c], self._points)[0][0].min(axis=1) for c in _slices(len(X), self._chunk)]
         return np.concatenate(parts) if parts else np.empty(0)
 
     def _missed_gap(self, gap: np.ndarray) -> np.ndarray:

@@ -50,6 +50,7 @@ def reduced(cell: Cell, engine: str = "auto") -> Nlp:
         unpack=Unpacker(batch),
         relax=Relaxer(batch),
         n_modes=len(batch.modes),
+        prepare=batch.prepare,
     )
 
 

@@ -46,7 +46,7 @@ class Outcome:
         mode: the discrete choice that goes with x.
         objective: the exact objective at x, NaN without one.
         evaluations: candidates of the exact model, or evaluations of the smooth objective.
-        build_s: time to build graphs and solver [s].
+        build_s: time to build what the solver needs [s], and the exact model where a runner prepares it.
         solve_s: time to solve [s].
         trace: progress, oldest first.
         message: the solver's own last word.
