@@ -5,7 +5,7 @@ RUN := $(VENV)/bin/python
 # no compiler, no licence: everything comes as wheels, at the versions in constraints.txt
 INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: reproduce test lint clean
+.PHONY: reproduce test lint bench clean
 
 reproduce: $(VENV)/.stamp-main
 	$(RUN) experiments/reproduce_paper.py
@@ -19,6 +19,9 @@ lint: $(VENV)/.stamp-lint
 	$(RUN) -m mypy
 	$(VENV)/bin/lint-imports
 
+bench: $(VENV)/.stamp-bench
+	$(RUN) -m benchmarks
+
 $(VENV)/.stamp-main: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(INSTALL) --editable .
@@ -30,6 +33,10 @@ $(VENV)/.stamp-test: $(VENV)/.stamp-main
 
 $(VENV)/.stamp-lint: $(VENV)/.stamp-main
 	$(INSTALL) --editable '.[test,fast,lint]'
+	touch $@
+
+$(VENV)/.stamp-bench: $(VENV)/.stamp-main
+	$(INSTALL) --editable '.[fast,bench]'
 	touch $@
 
 clean:
