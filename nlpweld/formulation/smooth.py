@@ -13,7 +13,7 @@ from nlpweld.formulation.nlp import Relaxation
 from nlpweld.formulation.stage import Stage
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs
-from nlpweld.kinematics.manipulability import mmr
+from nlpweld.kinematics.manipulability import magnitude, mmr
 
 GAP_SCALE_M = 0.1
 Branch = tuple[str, str]
@@ -58,7 +58,8 @@ def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, jets: bool = 
 
     Minimise  -mean_j MMR_j + sum_j sum_c softplus(-sharpness * g_jc) / sharpness  over the placement x, where
     g_jc >= 0 are the constraints of seam point j, each scaled to order one. Once the weight, one, exceeds twice
-    a constraint's multiplier, the minimiser lies on the feasible side, the nearer the sharper.
+    a constraint's multiplier, the minimiser lies on the feasible side, the nearer the sharper. MMR counts in a unit
+    that keeps it of order one, whatever the reading.
 
     Args:
         stage: the cell's graphs.
@@ -82,7 +83,8 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
     level = cell.constraints.clearance_m + cell.constraints.clearance_margin_m
     constraints.append((ca.vertcat(*seen, stage.workpiece_height(x, point)) - level) / GAP_SCALE_M)
     tight = [s.coupling.kind == "tight" for s in cell.stations]
-    value = mmr(cell.objective.reading, [a[1] for a in arms], [a[2] for a in arms], tight)
+    reading = cell.objective.reading
+    value = mmr(reading, [a[1] for a in arms], [a[2] for a in arms], tight) / magnitude(reading, tight)
     term = -value / n + ca.sum1(_softplus(-sharpness * ca.vertcat(*constraints))) / sharpness
     return ca.Function("term", [x, point, sharpness], [term], {"cse": True})
 

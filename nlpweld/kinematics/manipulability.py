@@ -29,6 +29,15 @@ def det_gram(J_v: ca.SX) -> ca.SX:
     )
 
 
+# m^3 in the reading's unit of volume
+UNIT: dict[str, float] = {"paper": 1.0, "equal": 1.0, "harmonic": 1.0, "sqrt_tight": 1.0, "millimetres": 1e9}
+
+
+def magnitude(reading: Reading, tight: Sequence[bool]) -> float:
+    """Return by how much a reading's unit blows up MMR, so that a solver can bring it back to order one."""
+    return UNIT[reading] ** sum(tight)
+
+
 def mmr(reading: Reading, w: Sequence[Any], gram: Sequence[Any], tight: Sequence[bool]) -> Any:
     """Return the multi-robot manipulability of one configuration (Pan et al., eq. 15 and 16).
 
@@ -47,7 +56,7 @@ def mmr(reading: Reading, w: Sequence[Any], gram: Sequence[Any], tight: Sequence
     Returns:
         MMR; its unit mixes (m^3)^n_tight with m^3 under ``paper`` (mm under ``millimetres``).
     """
-    unit = 1e9 if reading == "millimetres" else 1.0
+    unit = UNIT[reading]
     m_tight = _product([unit * wk for wk, t in zip(w, tight, strict=True) if t])
     m_loose = _product([unit * wk for wk, t in zip(w, tight, strict=True) if not t])
     if reading == "sqrt_tight":

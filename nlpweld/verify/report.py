@@ -192,7 +192,7 @@ class Report:
         if not self.samples:
             return ["  no plan to measure"]
         lines = [
-            f"  MMR ({self.reading})".ljust(18) + f"mean {self.mmr_mean:.6g}, {self.mmr_min:.6g} to {self.mmr_max:.6g}",
+            f"  MMR ({self.reading})".ljust(20) + f"mean {self.mmr_mean:.6g}, {self.mmr_min:.6g} to {self.mmr_max:.6g}",
             f"  M_tight, M_loose  mean {self.m_tight_mean:.6g}, {self.m_loose_mean:.6g}",
             "  w [m^3]           mean       least at points   along the seam",
         ]

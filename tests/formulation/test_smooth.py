@@ -43,7 +43,7 @@ def test_gradient_leaves_an_error_of_second_order(relaxation: Relaxation, x: np.
     value, gradient, _ = models(relaxation, x, 20.0)
     for d in directions():
         errors = [abs(float(relaxation.value(x + h * d, 20.0)) - value - h * gradient @ d) for h in STEPS]
-        assert slope(errors) == pytest.approx(2.0, abs=0.15)
+        assert slope(errors) > 1.85  # one, were the gradient wrong; more than two where a direction has no curvature
 
 
 @pytest.mark.parametrize("x", NEAR, ids=["paper", "infeasible", "elsewhere"])
@@ -52,7 +52,7 @@ def test_hessian_leaves_an_error_of_third_order(relaxation: Relaxation, x: np.nd
     for d in directions():
         model = [value + h * gradient @ d + h * h / 2 * d @ hessian @ d for h in STEPS]
         errors = [abs(float(relaxation.value(x + h * d, 20.0)) - m) for h, m in zip(STEPS, model, strict=True)]
-        assert slope(errors) == pytest.approx(3.0, abs=0.3)
+        assert slope(errors) > 2.7  # two, were the Hessian wrong
 
 
 def test_hessian_is_symmetric(relaxation: Relaxation) -> None:
