@@ -54,7 +54,11 @@ def variant(name: str, branches: str | None, reading: str | None, points: int | 
 def evaluate(
     cell: Cell, at: tuple[float, float, float] | None, placement: str | None, out: Path | None, json: bool
 ) -> int:
-    """Print the report of one placement; 0 when feasible, 1 when not."""
+    """Print the report of one placement; 0 when feasible, 1 when not.
+
+    Raises:
+        OptionError: a robot cannot reach the seam there, so there is nothing to measure.
+    """
     from nlpweld.bench.answer import evaluate_plan
     from nlpweld.formulation.reduced import reduced
 
@@ -66,9 +70,15 @@ def evaluate(
         plan.save(out)
     if json:
         print(json_.dumps({**report.to_json(), **_start(plan)}))
-    else:
+    if plan is None:
+        blame = report.violations[0]
+        raise OptionError(
+            f"{cell.name}: placement ({', '.join(f'{c:g}' for c in x)}) is out of reach of {blame.robot} "
+            f"at seam point {blame.point}; choose one nearer to its base"
+        )
+    if not json:
         print(report)
-        if plan is not None and out is not None:
+        if out is not None:
             print(f"plan: {out}")
     return 0 if report.feasible else 1
 

@@ -64,11 +64,20 @@ def test_the_optimum_of_the_points_alone_fails_between_them(call):
 
 def test_a_placement_out_of_reach_names_robot_and_point(call):
     code, out, err = call("evaluate", "three_er16", "--at", 2, 2, 2)
-    assert code == 1
-    assert "reach" in out
-    assert "handler" in out
-    assert "point" in out
-    assert err == ""
+    assert (code, out) == (2, "")
+    assert len(err.strip().splitlines()) == 1
+    for part in ("three_er16", "out of reach of handler", "seam point"):
+        assert part in err
+
+
+def test_a_placement_out_of_reach_still_answers_in_json(call):
+    code, out, err = call("evaluate", "three_er16", "--at", 0.6, 0.6, 1.2, "--json")
+    found = json.loads(out)
+    assert code == 2
+    assert "out of reach" in err
+    assert found["feasible"] is False
+    assert found["mmr_mean"] is None
+    assert [v["constraint"] for v in found["violations"]] == ["reach"]
 
 
 def test_named_placement_points_and_reading_change_the_question(call):
