@@ -145,8 +145,11 @@ def plots(folder: Path, json: bool) -> None:
     """Draw the figures of a folder of records."""
     from nlpweld.report.plots import write_plots
 
-    paths = write_plots(folder, note=None if json else print)
+    left_out: list[str] = []
+    paths = write_plots(folder, note=left_out.append)
     if json:
         print(json_.dumps({"figures": [str(path) for path in paths]}))
     else:
         print("\n".join(str(path) for path in paths))
+        if left_out:
+            print(f"{len(left_out)} more need data this folder does not hold, e.g. {left_out[0]}")

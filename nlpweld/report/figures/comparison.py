@@ -128,7 +128,9 @@ def _strip(axes: Axes, place: int, runs: pd.DataFrame, column: str, colour: str)
 
 def _solver_axis(axes: Axes, runs: pd.DataFrame, labels: list[str]) -> None:
     counts = runs.groupby("label")["verified"].agg(["sum", "size"])
-    names = [f"{label.replace('_', ' ')}\n({counts.loc[label, 'sum']}/{counts.loc[label, 'size']})" for label in labels]
+    # names side by side must not meet
+    shown = {label: label.replace("_", "\n").replace(":", ":\n") for label in labels}
+    names = [f"{shown[label]}\n({counts.loc[label, 'sum']}/{counts.loc[label, 'size']})" for label in labels]
     axes.set_xticks(range(len(labels)), names)
     axes.set_xlim(-0.6, len(labels) - 0.4)
     axes.grid(axis="x", visible=False)
