@@ -162,3 +162,13 @@ def test_figures_in_the_way_of_a_file_are_one_line(folder, add):
     (folder / "figures").write_text("a file is in the way")
     with pytest.raises(OutputError, match="cannot be written"):
         write_plots(folder)
+
+
+@pytest.mark.parametrize("solve_s", [0.20398452300105419, 0.001, 1.0, 12.5])
+def test_a_single_run_has_a_time_axis_with_height(folder, add, solve_s):
+    add(solve_s=solve_s)
+    study = Study(folder)
+    (figure,) = [d.draw(study) for d in drawings(study) if d.name.startswith("solve_time_by_solver")]
+    low, high = figure.axes[0].get_ylim()
+    assert low < solve_s < high
+    figure.canvas.draw()

@@ -12,6 +12,7 @@ from nlpweld.report.figures import Drawing
 from nlpweld.report.study import Study
 
 SPREAD = 0.13  # half width of the jitter that tells runs of one solver apart
+ROOM = 1.25  # factor left free below the shortest and above the longest time
 
 
 def drawings(study: Study) -> list[Drawing]:
@@ -57,6 +58,9 @@ def solve_time_by_solver(study: Study, cell: str) -> Figure:
     for i, label in enumerate(labels):
         ended = runs[(runs["label"] == label) & ~runs["status"].isin(["FAILED", "SKIPPED"]) & (runs["solve_s"] > 0)]
         _strip(axes, i, ended, "solve_s", style.SERIES[i % len(style.SERIES)])
+    times = runs.loc[runs["solve_s"] > 0, "solve_s"]
+    if len(times):  # a single run would leave a logarithmic axis without height
+        axes.set_ylim(times.min() / ROOM, times.max() * ROOM)
     style.plain_log(axes.yaxis)
     _solver_axis(axes, runs, labels)
     style.name_axes(axes, "solver (verified of runs)", "solve time, no build [s]", cell)
