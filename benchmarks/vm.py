@@ -32,7 +32,7 @@ class Vm:
         self.meetings = {pair: f.map(n) for pair, f in stage.meetings.items()}
         self.height = stage.workpiece_height.map(n)
         self.front_up = ca.DM(np.ones((3, n)))
-        self.tight = [s.coupling.kind == "tight" for s in self.cell.stations]
+        self.tight = self.cell.tight
 
     def __call__(self, X: np.ndarray) -> list[Verdict]:
         """Return the verdict of every placement (m, 3) [m]."""

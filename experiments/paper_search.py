@@ -62,8 +62,7 @@ class Profiles:
         ]
         shape = (len(X), points[0].shape[1])
         w = [np.broadcast_to(out[1][0], shape) for out in found]
-        tight = [s.coupling.kind == "tight" for s in self.cell.stations]
-        return np.stack(w, axis=1), mmr(self.cell.objective.reading, w, [out[2][0] for out in found], tight)
+        return np.stack(w, axis=1), mmr(self.cell.objective.reading, w, [out[2][0] for out in found], self.cell.tight)
 
 
 def worst_placements(

@@ -77,6 +77,16 @@ class Constraints(Sourced):
     joint_margin_deg: NonNegative
     verify_step_m: Positive
 
+    @property
+    def floor_at_points_m3(self) -> float:
+        """The singularity floor with the margin solvers keep at the seam's points [m^3]."""
+        return self.singularity_floor_m3 + self.singularity_margin_m3
+
+    @property
+    def clearance_at_points_m(self) -> float:
+        """The clearance with the margin solvers keep at the seam's points [m]."""
+        return self.clearance_m + self.clearance_margin_m
+
 
 class Objective(Sourced):
     """The reading of Pan et al., eq. (16)."""
@@ -155,6 +165,11 @@ class Cell(Checked):
     def content_hash(self) -> str:
         """SHA-256 of everything the cell states, sources included, as hexadecimal digits."""
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
+
+    @property
+    def tight(self) -> list[bool]:
+        """For each station whether it is tightly coupled to the workpiece."""
+        return [station.coupling.kind == "tight" for station in self.stations]
 
     @property
     def box(self) -> np.ndarray:

@@ -14,13 +14,12 @@ from nlpweld.engine.lanes import Lanes, joined, rows
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.nlp import Evaluation
 from nlpweld.formulation.paths import Limits, best_wrist
-from nlpweld.formulation.stage import Stage, with_lowest_gap
+from nlpweld.formulation.stage import GAP_SCALE_M, Stage, with_lowest_gap
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import ELBOW, SHOULDER, WRIST
 from nlpweld.kinematics.manipulability import mmr
 
 CONSTRAINTS = ("reach", "joint_limit", "singularity", "clearance")
-GAP_SCALE_M = 0.1  # a clearance missed by this much counts as one
 NEAR = 0.1  # share of the singularity floor that may lack for a candidate to be looked at any further
 
 
@@ -76,7 +75,8 @@ class Batch:
         return list(product(allowed(c.shoulder, SHOULDER), allowed(c.elbow, ELBOW)))
 
     @cached_property
-    def _points(self) -> np.ndarray:
+    def points(self) -> np.ndarray:
+        """The data of every seam point, shape (12, N)."""
         return point_data(self.cell, seam_parameters(self.cell))
 
     @property
@@ -98,14 +98,14 @@ class Batch:
 
     def _candidates(self, lanes: int) -> int:
         """Return how many candidates make so many lanes."""
-        return max(1, lanes // self._points.shape[1])
+        return max(1, lanes // self.points.shape[1])
 
     def prepare(self) -> None:
         """Build, compile and run everything once, so that what follows measures evaluation alone."""
         X, signs = self.cell.box.mean(axis=0)[None], np.ones(3)
         ends = []
         for grip, limbs in zip(self._grips, self._limbs, strict=True):
-            ends.append(limbs(X, self._points, grip(X, self._points, signs)[0])[1])
+            ends.append(limbs(X, self.points, grip(X, self.points, signs)[0])[1])
         for (k, l), meeting in self._meetings.items():
             meeting(ends[k], ends[l])
         self._lowest(self._height, X)
@@ -152,9 +152,9 @@ class Batch:
         missed, near, w, cos_sin = self._gripped(k, X, branch)
         slot = np.full(len(X), -1)
         slot[near] = np.arange(len(near))
-        parts = [self._limbs[k](X[near[c]], self._points, rows(cos_sin, c)) for c in _slices(len(near), self._chunk)]
+        parts = [self._limbs[k](X[near[c]], self.points, rows(cos_sin, c)) for c in _slices(len(near), self._chunk)]
         if not parts:
-            nothing = np.empty((0, self._points.shape[1]))
+            nothing = np.empty((0, self.points.shape[1]))
             return Side(missed, slot, nothing, nothing, [])
         missed[near, 3] = self._missed_gap(np.concatenate([part[2][0].min(axis=1) for part in parts]))
         return Side(missed, slot, w, joined([part[0] for part in parts])[0], joined([part[1] for part in parts]))
@@ -162,11 +162,10 @@ class Batch:
     def _gripped(self, k: int, X: np.ndarray, branch: tuple[str, str]) -> tuple[Any, ...]:
         """Return missed (m, 4), the rows worth going on with (r,), and their w (r, N) and cos_sin, twelve (r, N)."""
         signs = np.array([SHOULDER[branch[0]], ELBOW[branch[1]], 1.0])
-        limits = self.cell.constraints
-        floor = limits.singularity_floor_m3 + limits.singularity_margin_m3
+        floor = self.cell.constraints.floor_at_points_m3
         missed, near, kept = np.zeros((len(X), 4)), [], []
         for c in _slices(len(X), self._chunk):
-            cos_sin, (w,), (reach,) = self._grips[k](X[c], self._points, signs)
+            cos_sin, (w,), (reach,) = self._grips[k](X[c], self.points, signs)
             part = missed[c]
             part[:, 0] = np.maximum(0.0, -reach.min(axis=1))
             part[:, 1] = self._missed_joints(k, cos_sin, part[:, 0] == 0.0)
@@ -204,21 +203,19 @@ class Batch:
 
     def _lowest(self, gap: Callable[..., Any], X: np.ndarray) -> np.ndarray:
         """Return the least of a gap over the seam for placements X (m, 3), shape (m,)."""
-        parts = [gap(X[c], self._points)[0][0].min(axis=1) for c in _slices(len(X), self._chunk)]
+        parts = [gap(X[c], self.points)[0][0].min(axis=1) for c in _slices(len(X), self._chunk)]
         return np.concatenate(parts) if parts else np.empty(0)
 
     def _missed_gap(self, gap: np.ndarray) -> np.ndarray:
-        limits = self.cell.constraints
-        return np.maximum(0.0, limits.clearance_m + limits.clearance_margin_m - gap) / GAP_SCALE_M
+        return np.maximum(0.0, self.cell.constraints.clearance_at_points_m - gap) / GAP_SCALE_M
 
     def _mmr(self, chosen: list[Side]) -> np.ndarray:
         """Return the mean MMR of the candidates all chosen sides looked at, -inf for the others, shape (m,)."""
         seen = np.flatnonzero(np.all([side.slot >= 0 for side in chosen], axis=0))
-        tight = [s.coupling.kind == "tight" for s in self.cell.stations]
         w, gram = ([getattr(side, name)[side.slot[seen]] for side in chosen] for name in ("w", "gram"))
         objective = np.full(len(chosen[0].slot), -np.inf)
         with np.errstate(all="ignore"):  # without a floor, w and gram may be zero
-            value = mmr(self.cell.objective.reading, w, gram, tight).mean(axis=1)
+            value = mmr(self.cell.objective.reading, w, gram, self.cell.tight).mean(axis=1)
         objective[seen] = np.where(np.isfinite(value), value, -np.inf)
         return objective
 

@@ -7,10 +7,9 @@ import numpy as np
 
 from nlpweld.cell.cell import Cell
 from nlpweld.formulation.batch import CONSTRAINTS, Batch, allowed
-from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.nlp import Nlp, Relaxation, sobol
+from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.paths import Limits, best_wrist, joint_paths, on_wrist, settle
-from nlpweld.formulation.smooth import near_gaps, relaxation
+from nlpweld.formulation.smooth import Gaps, near_gaps, relaxation
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import WRIST, signs
 from nlpweld.plan import Plan
@@ -76,16 +75,23 @@ class Relaxer:
         What is left out is a guess from a sample; the exact model, which leaves nothing out, judges the answer.
         """
         batch = self.batch
-        X = self._scouts(mode)
-        gaps = None if whole or len(X) < self.enough else near_gaps(batch.stage, batch.modes[mode], X, self.within_m)
+        gaps = None if whole else self._near(mode)
         return relaxation(batch.stage, batch.modes[mode], gaps, jets=batch.has_jets)
 
-    def _scouts(self, mode: int) -> np.ndarray:
-        """Return random placements on a mode that keep all but clearances, or nearly so, shape (m, 3) [m]."""
+    def _near(self, mode: int) -> Gaps | None:
+        """Return the distances that matter at the scouts that keep all else, or nearly so; None if they are too few."""
+        X, found = self._scouted
+        X = X[np.isfinite(found.objective) & (found.mode == mode)]
+        if len(X) < self.enough:
+            return None
+        return near_gaps(self.batch.stage, self.batch.modes[mode], X, self.within_m)
+
+    @cached_property
+    def _scouted(self) -> tuple[np.ndarray, Evaluation]:
+        """Random placements (m, 3) [m] and what the exact model says of them, once for all modes."""
         lower, upper = self.batch.cell.box
         X = sobol(lower, upper, 0, self.scouts)
-        found = self.batch.evaluate(X)
-        return X[np.isfinite(found.objective) & (found.mode == mode)]
+        return X, self.batch.evaluate(X)
 
 
 @dataclass(frozen=True)
@@ -111,15 +117,12 @@ class Unpacker:
             branches[station.name] = (shoulder, elbow, wrist)
         return Plan(cell, np.asarray(x, dtype=float), seam_parameters(cell), paths, branches)
 
-    @cached_property
-    def _points(self) -> np.ndarray:
-        return point_data(self.batch.cell, seam_parameters(self.batch.cell))
-
     def _solve(self, k: int, x: np.ndarray, branch: tuple[str, str]) -> tuple[np.ndarray, np.ndarray]:
         """Return cosines and sines (12, N) and reach (N,) of station k by the CasADi graph itself."""
-        n = self._points.shape[1]
+        points = self.batch.points
+        n = points.shape[1]
         out = self.batch.stage.arms[k].map(n)(
-            np.repeat(np.reshape(x, (3, 1)), n, axis=1), self._points, np.array([signs((*branch, "noflip"))] * n).T
+            np.repeat(np.reshape(x, (3, 1)), n, axis=1), points, np.array([signs((*branch, "noflip"))] * n).T
         )
         cos_sin = np.array(out[0]).reshape(6, n, 2).transpose(2, 0, 1).reshape(12, n)
         return cos_sin, np.array(out[3]).ravel()

@@ -10,12 +10,11 @@ from nlpweld.cell.robot import Robot
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.derivatives import by_casadi, by_jets
 from nlpweld.formulation.nlp import Relaxation
-from nlpweld.formulation.stage import Stage
+from nlpweld.formulation.stage import GAP_SCALE_M, Stage
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs
 from nlpweld.kinematics.manipulability import magnitude, mmr
 
-GAP_SCALE_M = 0.1
 Branch = tuple[str, str]
 Mode = tuple[Branch, ...]
 
@@ -80,10 +79,9 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
     constraints = [g for k in range(len(arms)) for g in _robot_constraints(cell, k, arms[k])]
     seen = [arm[5][list(which)] for arm, which in zip(arms, gaps.solo, strict=True)]
     seen += [stage.meetings[k, l](arms[k][4], arms[l][4])[list(which)] for (k, l), which in gaps.meetings.items()]
-    level = cell.constraints.clearance_m + cell.constraints.clearance_margin_m
+    level = cell.constraints.clearance_at_points_m
     constraints.append((ca.vertcat(*seen, stage.workpiece_height(x, point)) - level) / GAP_SCALE_M)
-    tight = [s.coupling.kind == "tight" for s in cell.stations]
-    reading = cell.objective.reading
+    tight, reading = cell.tight, cell.objective.reading
     value = mmr(reading, [a[1] for a in arms], [a[2] for a in arms], tight) / magnitude(reading, tight)
     term = -value / n + ca.sum1(_softplus(-sharpness * ca.vertcat(*constraints))) / sharpness
     return ca.Function("term", [x, point, sharpness], [term], {"cse": True})
@@ -100,7 +98,7 @@ def _below(gaps: ca.DM, bound: float) -> tuple[int, ...]:
 
 def _robot_constraints(cell: Cell, k: int, arm: tuple[ca.SX, ...]) -> list[ca.SX]:
     limits = cell.constraints
-    floor = limits.singularity_floor_m3 + limits.singularity_margin_m3
+    floor = limits.floor_at_points_m3
     cos_sin, w, _, reach = arm[:4]
     joints = joint_constraints(
         cell.stations[k].robot, cos_sin[:, 0], cos_sin[:, 1], np.radians(limits.joint_margin_deg)

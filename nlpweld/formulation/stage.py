@@ -23,6 +23,7 @@ from nlpweld.kinematics.chain import Chain, Frame, constant, jacobian_of, rpy_po
 from nlpweld.kinematics.ik import SphericalArm, spherical_arm
 from nlpweld.kinematics.manipulability import det_gram
 
+GAP_SCALE_M = 0.1  # a clearance missed by this much counts as one
 ARM_OUTPUTS = ("cos_sin", "w", "gram", "reach", "ends", "gaps")
 
 

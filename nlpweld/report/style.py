@@ -19,7 +19,6 @@ BLUE, ORANGE, GREEN, RED, SKY, PURPLE, YELLOW = (
 GREY, INK = "#8C8C8C", "#222222"
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED)
 LINES = ("-", "--", "-.", (0, (1, 1.2)), (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)))
-MARKERS = ("o", "s", "^", "D", "v", "P")
 
 RC: dict[str, Any] = {
     "font.size": 8,
