@@ -11,7 +11,7 @@ from benchmarks.contenders import ENGINES, missing
 from benchmarks.peak import instructions
 from benchmarks.timing import Job
 from nlpweld.cell import Cell
-from nlpweld.engine.choice import engine
+from nlpweld.engine.numpy_kernels import numpy_kernel
 
 WHAT = {
     "fk_jacobian_det": "TCP pose, geometric Jacobian and |det J| of one configuration of one robot",
@@ -132,10 +132,18 @@ def _mapped(graph: ca.Function, x: np.ndarray) -> Callable[[], object]:
 
 
 def _kernel(kind: str, graph: ca.Function, x: np.ndarray) -> Callable[[], object]:
-    kernel = engine(kind).kernel(graph, ("lane",))
+    kernel = _lowered(kind)(graph, ("lane",))
     lanes = np.ascontiguousarray(np.broadcast_to(x[:, None, :], (len(x), *LANES)))
     given = lanes if kind == "numba" else list(lanes)
     return lambda: kernel(given)
+
+
+def _lowered(kind: str) -> Callable[[ca.Function, tuple[str, ...]], Callable]:
+    if kind == "numpy":
+        return numpy_kernel
+    from nlpweld.engine.numba_kernels import numba_kernel
+
+    return numba_kernel
 
 
 def _all(runs: list[Callable[[], object]]) -> Callable[[], object]:

@@ -77,7 +77,7 @@ def compared(section: str, what: str, unit: str, taken: dict[str, np.ndarray], b
 def full_instructions(cell: Cell) -> int:
     """Return the arithmetic instructions of one seam point when nothing is left out."""
     stage = Stage(cell)
-    graphs = [*stage.grips, *stage.limbs, *stage.meetings.values(), stage.workpiece_height]
+    graphs = [*stage.grips, *stage.limbs, *stage.meetings.values(), stage.work, *stage.heights]
     return sum(instructions(graph) for graph in graphs)
 
 

@@ -30,7 +30,7 @@ class Vm:
         self.grips = [f.map(n) for f in stage.grips]
         self.limbs = [f.map(n) for f in stage.limbs]
         self.meetings = {pair: f.map(n) for pair, f in stage.meetings.items()}
-        self.height = stage.workpiece_height.map(n)
+        self.work, self.heights = stage.work.map(n), [f.map(n) for f in stage.heights]
         self.front_up = ca.DM(np.ones((3, n)))
         self.tight = self.cell.tight
 
@@ -51,9 +51,10 @@ class Vm:
         angles = [np.array(grip[0]).reshape(6, n, 2) for grip in grips]
         if not good or not all(_inside(s.robot, a, need) for s, a in zip(self.cell.stations, angles, strict=True)):
             return Verdict(float("-inf"), False)
-        limbs = [f(at, self.points, grip[0]) for f, grip in zip(self.limbs, grips, strict=True)]
-        low = [float(ca.mmin(limb[2])) for limb in limbs] + [float(ca.mmin(self.height(at, self.points)))]
-        low += [float(ca.mmin(f(limbs[k][1], limbs[l][1]))) for (k, l), f in self.meetings.items()]
+        limbs = [f(grip[0]) for f, grip in zip(self.limbs, grips, strict=True)]
+        ends = [*(limb[1] for limb in limbs), self.work(at, self.points)]
+        low = [float(ca.mmin(f(own))) for f, own in zip(self.heights, ends, strict=True)]
+        low += [float(ca.mmin(f(ends[a], ends[b]))) for (a, b), f in self.meetings.items()]
         gram = [np.array(limb[0]).ravel() for limb in limbs]
         value = mmr(self.cell.objective.reading, w, gram, self.tight).mean()
         return Verdict(float(value), min(low) >= level.clearance_m + level.clearance_margin_m, min(low))

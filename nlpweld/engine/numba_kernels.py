@@ -27,8 +27,11 @@ PATTERNS = {
     ca.OP_IF_ELSE_ZERO: "({1} if {0} != 0.0 else 0.0)",
     ca.OP_FABS: "abs({0})",
     ca.OP_NOT: "1.0 * ({0} == 0.0)",
+    ca.OP_POW: "{0} ** {1}",
+    ca.OP_CONSTPOW: "{0} ** {1}",
 }
 HEAD = "from math import sqrt\n\nimport numba\n\n\n"
+JIT = "@numba.njit(error_model='numpy', cache=True)\n"
 
 
 def numba_kernel(function: ca.Function, kinds: Kinds) -> Kernel:
@@ -56,7 +59,12 @@ def _flat(given: Any, kind: str) -> np.ndarray:
 
 
 def source(function: ca.Function, kinds: Kinds, n: int) -> str:
-    """Return the source text of a module with the kernel for n seam points.
+    """Return the source text of a module with the kernel for n seam points."""
+    return HEAD + JIT + kernel_source(function, kinds, n, "kernel")
+
+
+def kernel_source(function: ca.Function, kinds: Kinds, n: int, called: str) -> str:
+    """Return the source text of a kernel for n seam points, a function of the number of candidates and flat arrays.
 
     Everything a candidate reads and writes is one slice with the number of points as a literal: offsets known when
     compiling let LLVM see that nothing overlaps, without which it does not vectorise a loop with many outputs.
@@ -64,8 +72,7 @@ def source(function: ca.Function, kinds: Kinds, n: int) -> str:
     names = [f"i{k}" for k in range(function.n_in())]
     outs = [function.nnz_out(k) * n for k in range(function.n_out())]
     lines = [
-        "@numba.njit(error_model='numpy', cache=True)",
-        f"def kernel(m, {', '.join(names + [f'o{k}' for k in range(len(outs))])}):",
+        f"def {called}(m, {', '.join(names + [f'o{k}' for k in range(len(outs))])}):",
         "    for i in range(m):",
         *(f"        o{k}_ = o{k}[i * {size} : (i + 1) * {size}]" for k, size in enumerate(outs)),
     ]
@@ -78,7 +85,7 @@ def source(function: ca.Function, kinds: Kinds, n: int) -> str:
             lines += [f"        {name}_{j} = {name}[{first}{j}]" for j in range(size)]
     lines.append(f"        for j in range({n}):")
     lines += [f"            {line}" for line in _body(function, kinds, n)]
-    return HEAD + "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n"
 
 
 def _body(f: ca.Function, kinds: Kinds, n: int) -> list[str]:

@@ -85,9 +85,14 @@ def numpy_kernel(function: ca.Function, kinds: Kinds) -> Kernel:
     def kernel(*inputs: Any) -> tuple[Lanes, ...]:
         shape = lane_shape(kinds, inputs)
         outputs = lowered(*(SHAPED[kind](given) for kind, given in zip(kinds, inputs, strict=True)))
-        return tuple([np.broadcast_to(value, shape) for value in output] for output in outputs)
+        return tuple([_whole(value, shape) for value in output] for output in outputs)
 
     return kernel
+
+
+def _whole(value: Any, shape: tuple[int, int]) -> np.ndarray:
+    """Return an output over all lanes; most are, and numpy.broadcast_to takes its time to find out."""
+    return value if np.shape(value) == shape else np.broadcast_to(value, shape)
 
 
 SHAPED: dict[str, Callable[[Any], Any]] = {

@@ -122,6 +122,11 @@ def _ranges(limits: Limits, cos_sin: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return low - limits.offset[:, None], high - limits.offset[:, None]
 
 
+def allowed(choice: str, all_: dict[str, int]) -> list[str]:
+    """Return the branch names a configuration entry allows."""
+    return list(all_) if choice == "any" else [choice]
+
+
 def on_wrist(robot: Robot, q: np.ndarray, wrist: str) -> np.ndarray:
     """Return noflip paths on the named wrist."""
     return q if wrist == "noflip" else flip(robot, q)

@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from nlpweld.cell.cell import Cell
-from nlpweld.formulation.batch import CONSTRAINTS, Batch, allowed
+from nlpweld.formulation.batch import CONSTRAINTS, Batch
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
-from nlpweld.formulation.paths import Limits, best_wrist, joint_paths, on_wrist, settle
+from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, on_wrist, settle
 from nlpweld.formulation.smooth import Gaps, near_gaps, relaxation
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import WRIST, signs

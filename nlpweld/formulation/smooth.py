@@ -10,7 +10,7 @@ from nlpweld.cell.robot import Robot
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.derivatives import by_casadi, by_jets
 from nlpweld.formulation.nlp import Relaxation
-from nlpweld.formulation.stage import GAP_SCALE_M, Stage
+from nlpweld.formulation.stage import GAP_SCALE_M, Owners, Stage
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs
 from nlpweld.kinematics.manipulability import magnitude, mmr
@@ -24,18 +24,18 @@ class Gaps:
     """Which distances a relaxation looks at, as indices into the stage's graphs.
 
     Attributes:
-        solo: for each station, of its limbs graph's gaps.
-        meetings: for each pair of stations, of its meeting graph's gaps.
+        meetings: for every two owners, of their meeting graph's gaps.
+        heights: for every owner, of its height graph's gaps.
     """
 
-    solo: tuple[tuple[int, ...], ...]
-    meetings: dict[tuple[int, int], tuple[int, ...]]
+    meetings: dict[Owners, tuple[int, ...]]
+    heights: tuple[tuple[int, ...], ...]
 
 
 def all_gaps(stage: Stage) -> Gaps:
     """Return every distance there is."""
-    solo = tuple(tuple(range(limbs.numel_out("gaps"))) for limbs in stage.limbs)
-    return Gaps(solo, {pair: tuple(range(meeting.numel_out(0))) for pair, meeting in stage.meetings.items()})
+    meetings = {owners: tuple(range(meeting.numel_out(0))) for owners, meeting in stage.meetings.items()}
+    return Gaps(meetings, tuple(tuple(range(height.numel_out(0))) for height in stage.heights))
 
 
 def near_gaps(stage: Stage, mode: Mode, X: np.ndarray, within_m: float) -> Gaps:
@@ -43,13 +43,15 @@ def near_gaps(stage: Stage, mode: Mode, X: np.ndarray, within_m: float) -> Gaps:
     points = point_data(stage.cell, seam_parameters(stage.cell))
     m, n = len(X), points.shape[1]
     x, point = np.repeat(X, n, axis=0).T, np.tile(points, m)
-    arms = [arm.map(m * n)(x, point, _branch(b, m * n)) for arm, b in zip(stage.arms, mode, strict=True)]
-    solo = tuple(_below(arm[5], within_m) for arm in arms)
+    ends = [arm.map(m * n)(x, point, _branch(b, m * n))[4] for arm, b in zip(stage.arms, mode, strict=True)]
+    ends.append(stage.work.map(m * n)(x, point))
     meetings = {
-        pair: _below(meeting.map(m * n)(arms[pair[0]][4], arms[pair[1]][4]), within_m)
-        for pair, meeting in stage.meetings.items()
+        (a, b): _below(meeting.map(m * n)(ends[a], ends[b]), within_m) for (a, b), meeting in stage.meetings.items()
     }
-    return Gaps(solo, meetings)
+    return Gaps(
+        meetings,
+        tuple(_below(height.map(m * n)(own), within_m) for height, own in zip(stage.heights, ends, strict=True)),
+    )
 
 
 def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, jets: bool = False) -> Relaxation:
@@ -77,10 +79,10 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
     cell = stage.cell
     arms = [arm(x, point, _branch(b)) for arm, b in zip(stage.arms, mode, strict=True)]
     constraints = [g for k in range(len(arms)) for g in _robot_constraints(cell, k, arms[k])]
-    seen = [arm[5][list(which)] for arm, which in zip(arms, gaps.solo, strict=True)]
-    seen += [stage.meetings[k, l](arms[k][4], arms[l][4])[list(which)] for (k, l), which in gaps.meetings.items()]
-    level = cell.constraints.clearance_at_points_m
-    constraints.append((ca.vertcat(*seen, stage.workpiece_height(x, point)) - level) / GAP_SCALE_M)
+    ends = [*(arm[4] for arm in arms), stage.work(x, point)]
+    seen = [stage.meetings[a, b](ends[a], ends[b])[list(which)] for (a, b), which in gaps.meetings.items()]
+    seen += [h(own)[list(which)] for h, own, which in zip(stage.heights, ends, gaps.heights, strict=True)]
+    constraints.append((ca.vertcat(*seen) - cell.constraints.clearance_at_points_m) / GAP_SCALE_M)
     tight, reading = cell.tight, cell.objective.reading
     value = mmr(reading, [a[1] for a in arms], [a[2] for a in arms], tight) / magnitude(reading, tight)
     term = -value / n + ca.sum1(_softplus(-sharpness * ca.vertcat(*constraints))) / sharpness

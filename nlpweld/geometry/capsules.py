@@ -5,7 +5,9 @@ import casadi as ca
 TINY = 1e-12
 
 
-def segment_distance(start_a: ca.SX, end_a: ca.SX, start_b: ca.SX, end_b: ca.SX, sq_a: float, sq_b: float) -> ca.SX:
+def segment_distance(
+    start_a: ca.SX, end_a: ca.SX, start_b: ca.SX, end_b: ca.SX, sq_a: float | ca.SX, sq_b: float | ca.SX
+) -> ca.SX:
     """Return the distance between two segments [m].
 
     The nearest points on the two infinite lines are clamped to the segments, first on a, then on b, then on a
@@ -16,12 +18,12 @@ def segment_distance(start_a: ca.SX, end_a: ca.SX, start_b: ca.SX, end_b: ca.SX,
         end_a: the other end of segment a.
         start_b: one end of segment b.
         end_b: the other end of segment b.
-        sq_a: squared length of segment a [m^2]: bodies are rigid, so this is a number.
+        sq_a: squared length of segment a [m^2]: bodies are rigid, so this is no function of them.
         sq_b: squared length of segment b [m^2].
     """
     u, v, gap = end_a - start_a, end_b - start_b, start_a - start_b
     along, across, offset = ca.dot(u, v), ca.dot(u, gap), ca.dot(v, gap)
-    a, b = max(sq_a, TINY), max(sq_b, TINY)
+    a, b = ca.fmax(sq_a, TINY), ca.fmax(sq_b, TINY)
     free = _clamp((along * offset - across * b) / ca.fmax(a * b - along**2, TINY * a * b))
     t = _clamp((along * free + offset) / b)
     s = _clamp((along * t - across) / a)

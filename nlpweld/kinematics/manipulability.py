@@ -71,7 +71,7 @@ def _weights(reading: Reading, gram: Sequence[Any], tight: Sequence[bool]) -> tu
     """Return beta_1 and beta_2 up to their common factor."""
     if reading == "equal":
         return 1.0, 1.0
-    shares = [g**-0.5 for g in gram]
+    shares = [1.0 / g**0.5 for g in gram]
     ours = [s for s, t in zip(shares, tight, strict=True) if t]
     theirs = [s for s, t in zip(shares, tight, strict=True) if not t]
     return sum(ours) / len(ours), sum(theirs) / len(theirs)

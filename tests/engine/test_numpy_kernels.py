@@ -57,9 +57,9 @@ def test_lowered_meeting_agrees_with_its_graph(batch: Batch, rng: np.random.Gene
     assert largest_difference(meeting, inputs) < 1e-12
 
 
-def test_lowered_workpiece_height_agrees_with_its_graph(batch: Batch, rng: np.random.Generator) -> None:
+def test_lowered_workpiece_agrees_with_its_graph(batch: Batch, rng: np.random.Generator) -> None:
     inputs = stage_inputs(batch.cell, rng)[:2]
-    assert largest_difference(batch.stage.workpiece_height, inputs) < 1e-12
+    assert largest_difference(batch.stage.work, inputs) < 1e-12
 
 
 def test_lowered_distance_of_two_bodies_without_length_is_that_of_their_points() -> None:
@@ -70,8 +70,8 @@ def test_lowered_distance_of_two_bodies_without_length_is_that_of_their_points()
     assert distance == pytest.approx([5.0, 5.0], abs=1e-9)
 
 
-def test_three_pairs_of_three_stations_meet(cell: Cell) -> None:
-    assert list(Stage(cell).meetings) == [(0, 1), (0, 2), (1, 2)]
+def test_three_stations_meet_each_other_and_the_workpiece(cell: Cell) -> None:
+    assert list(Stage(cell).meetings) == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
 
 
 # Numbers that settle every comparison, sign and logic; the logarithm, root and power take the positive ones.

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from nlpweld.cell import Cell
-from nlpweld.formulation.batch import NEAR, Batch
+from nlpweld.formulation.batch import Batch
+from nlpweld.formulation.staged import NEAR
 
 from .helpers import PAPER, arm_outputs
 

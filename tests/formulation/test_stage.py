@@ -53,20 +53,24 @@ def test_w_and_gram_are_the_determinants_of_the_jacobian_at_the_tcp(batch: Batch
     assert gram[:, 0] == pytest.approx(np.linalg.det(J[:, :3] @ J[:, :3].transpose(0, 2, 1)), rel=1e-10)
 
 
-def test_gap_names_leave_out_what_may_touch_and_what_stands_on_the_floor(batch: Batch) -> None:
-    handler = [name.removeprefix("handler_1.") for name in batch.stage.gap_names[0]]
-    welder = [name.removeprefix("welder.") for name in batch.stage.gap_names[2]]
+def named_pairs(stage: Stage, owners: tuple[int, int]) -> set[str]:
+    a, b = (stage.shapes[owner] for owner in owners)
+    return {f"{a[i].name} - {b[j].name}" for i, j in stage.pairs[owners]}
+
+
+def test_pairs_with_the_workpiece_leave_out_what_may_touch(batch: Batch) -> None:
     arm, held, works = ["base_column", "upper_arm", "forearm"], ["wrist", "gripper"], ["main_pipe", "branch"]
     expected = {f"{b} - {w}" for b in arm for w in works} | {f"{b} - branch" for b in held}
-    assert set(handler) == expected | {f"{b} - floor" for b in [*arm[1:], *held]}
+    assert named_pairs(batch.stage, (0, 3)) == named_pairs(batch.stage, (1, 3)) == expected
     touching = [*arm, "wrist", "torch_body"]
-    expected = {f"{b} - {w}" for b in touching for w in works}
-    assert set(welder) == expected | {f"{b} - floor" for b in [*touching[1:], "nozzle"]}
+    assert named_pairs(batch.stage, (2, 3)) == {f"{b} - {w}" for b in touching for w in works}
 
 
-@STATIONS
-def test_every_named_gap_has_one_number(batch: Batch, k: int) -> None:
-    assert batch.stage.arms[k].numel_out("gaps") == len(batch.stage.gap_names[k])
+def test_floor_concerns_every_body_but_base_columns(batch: Batch) -> None:
+    for shapes, height in zip(batch.stage.shapes, batch.stage.heights, strict=True):
+        assert {s.name for s in shapes if not s.above_floor} <= {"base_column"}
+        assert height.numel_out(0) == sum(s.above_floor for s in shapes)
+    assert [len(shapes) for shapes in batch.stage.shapes] == [5, 5, 6, 2]
 
 
 def sampled_gap(ends: np.ndarray, radii: tuple[float, float]) -> float:
@@ -89,26 +93,37 @@ def test_meeting_gives_the_clearance_of_every_two_bodies_of_two_robots(batch: Ba
     assert got == pytest.approx(expected, abs=1e-4)
 
 
-def test_solo_gaps_give_the_clearance_to_pipes_and_floor(batch: Batch) -> None:
-    station, T_W_C = batch.cell.stations[2], workpiece_poses(batch.cell, PAPER)[0]
-    _, _, _, _, ends, gaps = (out[0] for out in arm_outputs(batch.stage, 2, PAPER))
-    ends = ends.reshape(-1, 3)
-    works = {b.name: b for b in batch.cell.workpiece.bodies}
-    for name, gap in zip(batch.stage.gap_names[2], gaps, strict=True):
-        body, other = name.removeprefix("welder.").split(" - ")
-        i = [b.name for b in station.bodies].index(body)
-        mine, radius = ends[2 * i : 2 * i + 2], station.bodies[i].radius_m
-        if other == "floor":
-            expected = mine[:, 2].min() - radius
-        else:
-            pipe = [(T_W_C @ [*p, 1])[:3] for p in (works[other].start_m, works[other].end_m)]
-            expected = sampled_gap(np.array([*mine, *pipe]), (radius, works[other].radius_m))
-        assert gap == pytest.approx(expected, abs=1e-4)
+def test_meeting_with_the_workpiece_gives_the_clearance_to_the_pipes(batch: Batch) -> None:
+    stage, station, T_W_C = batch.stage, batch.cell.stations[2], workpiece_poses(batch.cell, PAPER)[0]
+    ends, works = arm_outputs(stage, 2, PAPER)[4][0].reshape(-1, 3), batch.cell.workpiece.bodies
+    point = batch.points[:, 0]
+    got = np.array(stage.meetings[2, 3](ends.T, stage.work(PAPER, point))).ravel()
+    for (i, j), gap in zip(stage.pairs[2, 3], got, strict=True):
+        pipe = [(T_W_C @ [*p, 1])[:3] for p in (works[j].start_m, works[j].end_m)]
+        radii = (station.bodies[i].radius_m, works[j].radius_m)
+        assert gap == pytest.approx(sampled_gap(np.array([*ends[2 * i : 2 * i + 2], *pipe]), radii), abs=1e-4)
+
+
+def test_heights_are_those_of_the_lower_ends(batch: Batch) -> None:
+    ends, bodies = arm_outputs(batch.stage, 2, PAPER)[4][0].reshape(-1, 2, 3), batch.cell.stations[2].bodies
+    got = np.array(batch.stage.heights[2](ends.reshape(-1, 3).T)).ravel()
+    assert got == pytest.approx([e[:, 2].min() - b.radius_m for e, b in zip(ends[1:], bodies[1:], strict=True)])
 
 
 def test_workpiece_height_is_that_of_its_lowest_points(batch: Batch) -> None:
-    heights = np.array(batch.stage.workpiece_height(PAPER, np.array([*np.eye(3).ravel(), 0, 0, 0]))).ravel()
-    assert heights == pytest.approx([0.404 - 0.1, 0.404 - 0.05], abs=1e-15)
+    ends = batch.stage.work(PAPER, np.array([*np.eye(3).ravel(), 0, 0, 0]))
+    assert np.array(batch.stage.heights[3](ends)).ravel() == pytest.approx([0.404 - 0.1, 0.404 - 0.05], abs=1e-15)
+
+
+def test_generic_gap_is_every_pairs_own(batch: Batch) -> None:
+    stage = batch.stage
+    ends = [arm_outputs(stage, k, PAPER)[4][0].reshape(-1, 3).T for k in (0, 2)]
+    got = []
+    for i, j in stage.pairs[0, 2]:
+        p, q = stage.shapes[0][i], stage.shapes[2][j]
+        numbers = np.array([p.sq_length, q.sq_length, p.radius_m + q.radius_m])
+        got.append(float(stage.gap(ends[0][:, 2 * i : 2 * i + 2], ends[1][:, 2 * j : 2 * j + 2], numbers)))
+    assert got == pytest.approx(np.array(stage.meetings[0, 2](*ends)).ravel(), abs=1e-13)
 
 
 def test_closest_pair_at_the_papers_placement_is_the_forearm_of_handler_1_and_the_torch_at_point_0(cell: Cell) -> None:
