@@ -32,6 +32,8 @@ PATTERNS = {
 }
 HEAD = "from math import sqrt\n\nimport numba\n\n\n"
 JIT = "@numba.njit(error_model='numpy', cache=True)\n"
+# for what only other compiled functions call: without wrappers it compiles in half the time
+INNER = "@numba.njit(error_model='numpy', no_cpython_wrapper=True, no_cfunc_wrapper=True)\n"
 
 
 def numba_kernel(function: ca.Function, kinds: Kinds) -> Kernel:

@@ -7,8 +7,6 @@ import numpy as np
 
 from nlpweld.formulation.nlp import Relaxation
 
-UPPER = np.triu_indices(3)
-
 
 def by_casadi(term: ca.Function, points: np.ndarray) -> Relaxation:
     """Return value, gradient and Hessian of ``sum_j term(x, point_j, sharpness)`` as CasADi functions.
@@ -27,7 +25,7 @@ def _summed(name: str, inputs: list[ca.SX], output: ca.SX, data: ca.DM) -> ca.Fu
     """Return ``(x, sharpness) -> sum over the seam points`` of one point's output."""
     n = data.shape[1]
     one = ca.Function(name, inputs, [output], {"cse": True})
-    x, sharpness = ca.MX.sym("x", 3), ca.MX.sym("sharpness")
+    x, sharpness = ca.MX.sym("x", inputs[0].numel()), ca.MX.sym("sharpness")
     columns = one.map(n)(ca.repmat(x, 1, n), data, ca.repmat(sharpness, 1, n))
     width = output.shape[1]
     total = ca.horzcat(*[ca.sum2(columns[:, k::width]) for k in range(width)])
@@ -38,17 +36,17 @@ def by_jets(term: ca.Function, points: np.ndarray) -> Relaxation:
     """Return the same by second-order jets: one pass gives all three, kept for the calls that follow at one point."""
     from nlpweld.engine.jets import summed_jet
 
-    jet = _Remembered(summed_jet(term, points))
+    jet, d = _Remembered(summed_jet(term, points)), term.nnz_in(0)
     return Relaxation(
-        _Part("value", lambda x, p: jet(x, p, False)[:1], (1, 1)),
-        _Part("gradient", lambda x, p: jet(x, p, True)[1:4], (3, 1)),
-        _Part("hessian", lambda x, p: _matrix(jet(x, p, True)), (3, 3)),
+        _Part("value", lambda x, p: jet(x, p, False)[:1], d, 0),
+        _Part("gradient", lambda x, p: jet(x, p, True)[1 : 1 + d], d, 1),
+        _Part("hessian", lambda x, p: _matrix(jet(x, p, True)[1 + d :], d), d, d),
     )
 
 
-def _matrix(jet: np.ndarray) -> np.ndarray:
-    upper = np.zeros((3, 3))
-    upper[UPPER] = jet[4:]
+def _matrix(triangle: np.ndarray, d: int) -> np.ndarray:
+    upper = np.zeros((d, d))
+    upper[np.triu_indices(d)] = triangle
     return upper + np.triu(upper, 1).T
 
 
@@ -66,11 +64,14 @@ class _Remembered:
 
 
 class _Part(ca.Callback):
-    """One part of a jet as a CasADi function ``(x, sharpness) -> part``; its owner must keep it alive."""
+    """One part of a jet as a CasADi function ``(x, sharpness) -> part``; its owner must keep it alive.
 
-    def __init__(self, name: str, part: Callable[[np.ndarray, float], np.ndarray], shape: tuple[int, int]) -> None:
+    With no columns the part is a number, else it has d rows.
+    """
+
+    def __init__(self, name: str, part: Callable[[np.ndarray, float], np.ndarray], d: int, columns: int) -> None:
         ca.Callback.__init__(self)
-        self.part, self.shape = part, shape
+        self.part, self.d, self.columns = part, d, columns
         self.construct(name, {})
 
     def get_n_in(self) -> int:
@@ -80,10 +81,10 @@ class _Part(ca.Callback):
         return 1
 
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(3 if i == 0 else 1, 1)
+        return ca.Sparsity.dense(self.d if i == 0 else 1, 1)
 
     def get_sparsity_out(self, i: int) -> ca.Sparsity:
-        return ca.Sparsity.dense(*self.shape)
+        return ca.Sparsity.dense(1 if self.columns == 0 else self.d, max(1, self.columns))
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:
         return [ca.DM(self.part(np.array(arg[0]).ravel(), float(arg[1])))]

@@ -10,7 +10,7 @@ import numpy as np
 
 from nlpweld.cell.cell import Cell
 from nlpweld.engine.lanes import Kinds
-from nlpweld.engine.numba_kernels import JIT, kernel_source, load
+from nlpweld.engine.numba_kernels import INNER, JIT, kernel_source, load
 from nlpweld.formulation import candidate
 from nlpweld.formulation.candidate import Facts, Scratch
 from nlpweld.formulation.nlp import Evaluation
@@ -54,7 +54,6 @@ N = {n}
 NEAR = {near!r}
 GAP_SCALE_M = {scale!r}
 """
-INNER = "@numba.njit(error_model='numpy', no_cpython_wrapper=True, no_cfunc_wrapper=True)\n"
 
 
 @dataclass(frozen=True)
