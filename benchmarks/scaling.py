@@ -84,7 +84,7 @@ def draw(table: pd.DataFrame, path: Path) -> None:
     """Draw time and peak memory over both axes."""
     from matplotlib import rc_context
 
-    from nlpweld.report.style import LINES, MARKERS, RC, SERIES, figure, name_axes
+    from nlpweld.report.style import LINES, RC, SERIES, figure, name_axes
 
     with rc_context(RC):
         fig = figure(height_mm=95.0)
@@ -94,7 +94,7 @@ def draw(table: pd.DataFrame, path: Path) -> None:
                 style = {
                     "color": SERIES[k],
                     "linestyle": LINES[k],
-                    "marker": MARKERS[k],
+                    "marker": "os"[k],
                     "markersize": 3,
                     "label": kind,
                 }

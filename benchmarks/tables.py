@@ -19,8 +19,9 @@ def markdown(rows: pd.DataFrame, about: dict, instructions: int) -> str:
         "## Whole candidates",
         *(piece for kind, what in candidates.SETS.items() for piece in _candidates(rows, kind, what)),
         f"The share of the peak counts {instructions} arithmetic instructions a seam point, each as one multiply-add "
-        f"at {about['peak_multiply_adds_per_s'] / 1e9:.1f} G/s ({about['peak_measured_by']}). Divisions and square "
-        "roots take longer, and unwrapping is not counted.",
+        f"at {about['peak_multiply_adds_per_s'] / 1e9:.1f} G/s ({about['peak_measured_by']}). The engines find most "
+        "distances unneeded and so count for more than they compute. Divisions and square roots take longer, and "
+        "unwrapping is not counted.",
         "## Parts",
         *(piece for part, what in parts.WHAT.items() for piece in _parts(rows, part, what)),
         *_others(rows),

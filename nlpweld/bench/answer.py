@@ -38,15 +38,20 @@ class Answer:
         return self.report is not None and self.report.feasible
 
 
-def formulate(cell: Cell, formulation: str = "reduced") -> Nlp:
+def formulate(cell: Cell, formulation: str = "reduced", engine: str = "auto") -> Nlp:
     """Return a cell's problem in one of the formulations.
 
+    Args:
+        cell: the cell.
+        formulation: name of the formulation.
+        engine: ``numpy``, ``numba``, ``c``, or ``auto`` for the fastest that is installed; answers agree.
+
     Raises:
-        OptionError: no such formulation; lists those there are.
+        OptionError: no such formulation or engine; lists those there are.
     """
     if formulation not in FORMULATIONS:
         raise OptionError(f"formulation '{formulation}' is unknown. There are: {', '.join(FORMULATIONS)}")
-    return FORMULATIONS[formulation](cell)
+    return FORMULATIONS[formulation](cell, engine)
 
 
 def with_branches(cell: Cell, branches: str | None) -> Cell:

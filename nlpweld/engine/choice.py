@@ -1,14 +1,18 @@
-"""Which engine runs the graphs: NumPy always, Numba where the ``fast`` extra is installed."""
+"""Which engine runs the graphs: NumPy always, Numba where the ``fast`` extra is installed.
+
+Engine ``c`` is NumPy with derivatives compiled by the system's C compiler, for whoever has one but not Numba; it
+pays when a cell is solved many times, for compiling takes ten seconds.
+"""
 
 from importlib.util import find_spec
 
 from nlpweld.errors import OptionError
 
-ENGINES = ("auto", "numpy", "numba")
+ENGINES = ("auto", "numpy", "numba", "c")
 
 
 def chosen_engine(name: str) -> str:
-    """Return ``numpy`` or ``numba`` for the name of an engine; ``auto`` takes Numba where it is installed.
+    """Return ``numpy``, ``numba`` or ``c`` for the name of an engine; ``auto`` takes Numba where it is installed.
 
     Raises:
         OptionError: no such engine, or Numba is not installed.
@@ -18,4 +22,6 @@ def chosen_engine(name: str) -> str:
     installed = find_spec("numba") is not None
     if name == "numba" and not installed:
         raise OptionError("engine 'numba' is not installed; bring it with: pip install 'nlpweld[fast]'")
-    return "numba" if installed and name != "numpy" else "numpy"
+    if name == "auto":
+        return "numba" if installed else "numpy"
+    return name

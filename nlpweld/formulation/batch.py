@@ -37,7 +37,7 @@ class Batch:
 
     Attributes:
         cell: the cell.
-        engine: ``numpy``, ``numba`` (the ``fast`` extra), or ``auto`` for the fastest there is.
+        engine: ``numpy``, ``numba`` (the ``fast`` extra), ``c``, or ``auto`` for the fastest that is installed.
     """
 
     cell: Cell
@@ -65,14 +65,14 @@ class Batch:
         return point_data(self.cell, seam_parameters(self.cell))
 
     @property
-    def has_jets(self) -> bool:
-        """Whether derivatives may come from jets on Numba."""
-        return chosen_engine(self.engine) == "numba"
+    def chosen_engine(self) -> str:
+        """The engine that ``auto`` stands for here."""
+        return chosen_engine(self.engine)
 
     @cached_property
     def _evaluator(self) -> Evaluator:
         given = self.cell, self.stage, self.points, self.arm_branches
-        if chosen_engine(self.engine) == "numpy":
+        if self.chosen_engine != "numba":
             return Staged(*given)
         from nlpweld.formulation.fused import Fused  # Numba, which the base install lacks
 

@@ -35,7 +35,7 @@ def reduced(cell: Cell, engine: str = "auto") -> Nlp:
 
     Args:
         cell: the cell.
-        engine: ``numpy``, ``numba`` or ``auto``; for a handful of candidates NumPy is ready sooner.
+        engine: ``numpy``, ``numba``, ``c`` or ``auto``; for a handful of candidates NumPy is ready sooner.
     """
     batch = Batch(cell, engine)
     return Nlp(
@@ -76,7 +76,7 @@ class Relaxer:
         """
         batch = self.batch
         gaps = None if whole else self._near(mode)
-        return relaxation(batch.stage, batch.modes[mode], gaps, jets=batch.has_jets)
+        return relaxation(batch.stage, batch.modes[mode], gaps, batch.chosen_engine)
 
     def _near(self, mode: int) -> Gaps | None:
         """Return the distances that matter at the scouts that keep all else, or nearly so; None if they are too few."""

@@ -8,7 +8,7 @@ import numpy as np
 from nlpweld.cell.cell import Cell
 from nlpweld.cell.robot import Robot
 from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.derivatives import by_casadi, by_jets
+from nlpweld.formulation.derivatives import DERIVATIVES
 from nlpweld.formulation.nlp import Relaxation
 from nlpweld.formulation.stage import GAP_SCALE_M, Owners, Stage
 from nlpweld.geometry.seam import seam_parameters
@@ -54,7 +54,7 @@ def near_gaps(stage: Stage, mode: Mode, X: np.ndarray, within_m: float) -> Gaps:
     )
 
 
-def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, jets: bool = False) -> Relaxation:
+def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, engine: str = "numpy") -> Relaxation:
     """Return the penalised problem of a cell on fixed arm branches.
 
     Minimise  -mean_j MMR_j + sum_j sum_c softplus(-sharpness * g_jc) / sharpness  over the placement x, where
@@ -66,11 +66,11 @@ def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, jets: bool = 
         stage: the cell's graphs.
         mode: (shoulder, elbow) of every station.
         gaps: the distances to look at; all by default.
-        jets: differentiate by jets on Numba instead of by CasADi.
+        engine: ``numba`` differentiates by jets, ``c`` compiles what CasADi differentiates.
     """
     points = point_data(stage.cell, seam_parameters(stage.cell))
     term = term_function(stage, mode, gaps or all_gaps(stage), points.shape[1])
-    return (by_jets if jets else by_casadi)(term, points)
+    return DERIVATIVES[engine](term, points)
 
 
 def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:

@@ -85,7 +85,7 @@ def test_engines_judge_candidates_alike(cell: Cell, branches: str) -> None:
 
 
 def test_unknown_engine_lists_those_there_are() -> None:
-    with pytest.raises(OptionError, match="auto, numpy, numba"):
+    with pytest.raises(OptionError, match="auto, numpy, numba, c"):
         chosen_engine("fortran")
 
 

@@ -86,6 +86,6 @@ def test_more_than_one_output_is_refused() -> None:
 
 
 def test_relaxation_by_either_way_is_the_same_problem(cell: Cell) -> None:
-    ours, theirs = relaxation(Stage(cell), FRONT, jets=True), relaxation(Stage(cell), FRONT)
+    ours, theirs = relaxation(Stage(cell), FRONT, engine="numba"), relaxation(Stage(cell), FRONT)
     at = [0.01, -0.2, 0.38]
     assert float(ours.value(at, 50.0)) == pytest.approx(float(theirs.value(at, 50.0)), rel=1e-12)
