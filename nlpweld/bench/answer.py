@@ -71,28 +71,38 @@ def with_branches(cell: Cell, branches: str | None) -> Cell:
     return cell.with_(configuration=choices[branches])
 
 
-def evaluate(cell: Cell, at: tuple[float, float, float] | np.ndarray) -> Report:
+def evaluate(cell: Cell, at: tuple[float, ...] | np.ndarray) -> Report:
     """Return the verifier's report of a placement, on the best branches the cell allows.
 
     Args:
         cell: the cell.
-        at: origin of C in W [m].
+        at: x, y, z of the placement frame in W [m], and its yaw [rad] if it is turned.
+
+    Raises:
+        OptionError: a coordinate is not finite, or the cell holds it at another value.
+        KinematicsError: a positioner cannot turn the seam upright.
     """
-    return evaluate_plan(reduced(cell, engine="numpy"), np.asarray(at, dtype=float))[1]
+    return evaluate_plan(reduced(cell, engine="numpy"), coordinates(cell, at))[1]
+
+
+def coordinates(cell: Cell, at: tuple[float, ...] | np.ndarray) -> np.ndarray:
+    """Return the free coordinates of a placement x, y, z [m] and perhaps yaw [rad].
+
+    Raises:
+        OptionError: a coordinate is not finite, or the cell holds it at another value.
+    """
+    placement = np.asarray(at, dtype=float)
+    if not np.isfinite(placement).all():
+        raise OptionError(f"placement {placement.tolist()} holds NaN or infinity; give finite numbers in metres")
+    return cell.coordinates(placement)
 
 
 def evaluate_plan(nlp: Nlp, x: np.ndarray, mode: int | None = None) -> tuple[Plan | None, Report]:
-    """Return plan and report of a point of a problem; without a mode, of the best mode there.
-
-    Raises:
-        OptionError: x is not finite.
-    """
-    if not np.isfinite(x).all():
-        raise OptionError(f"placement {x.tolist()} holds NaN or infinity; give three finite numbers in metres")
+    """Return plan and report of a point of a problem; without a mode, of the best mode there."""
     assert nlp.unpack is not None
     plan = nlp.unpack(x, int(nlp.evaluate(x[None]).mode[0]) if mode is None else mode)
     if isinstance(plan, OutOfReach):
-        return None, unreachable(plan.cell, x, plan.station, plan.point, plan.cell.seam.points)
+        return None, unreachable(plan.cell, plan.cell.placement(x), plan.station, plan.point, plan.cell.seam.points)
     return plan, verify(plan)
 
 

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from nlpweld.bench.answer import Answer, formulate, solve
-from nlpweld.cell.cell import Cell
+from nlpweld.cell.cell import VARIABLES, Cell
 from nlpweld.errors import NlpweldError
 from nlpweld.solvers import Budget, presets
 
-RECORD_VERSION = 1
+RECORD_VERSION = 2
 PACKAGES = ("nlpweld", "casadi", "numpy", "scipy", "pymoo", "python-fcl")
 
 
@@ -79,7 +79,7 @@ def run_task(task: Task) -> dict[str, Any]:
         answer = solve(nlp, task.solver, seed=task.seed, budget=task.budget, preset=task.preset)
     except (NlpweldError, ArithmeticError, RuntimeError, ValueError) as error:
         return failed(task, f"{type(error).__name__}: {error}", time.perf_counter() - began)
-    return _record(task, answer, nlp.names, time.perf_counter() - began)
+    return _record(task, answer, time.perf_counter() - began)
 
 
 def failed(task: Task, message: str, wall_s: float) -> dict[str, Any]:
@@ -105,14 +105,14 @@ def _head(task: Task) -> dict[str, Any]:
     }
 
 
-def _record(task: Task, answer: Answer, names: tuple[str, ...], wall_s: float) -> dict[str, Any]:
+def _record(task: Task, answer: Answer, wall_s: float) -> dict[str, Any]:
     outcome = answer.outcome
     return {
         **_head(task),
         "status": outcome.status,
         "message": outcome.message,
         "verified": answer.verified,
-        "placement": None if outcome.x is None else dict(zip(names, outcome.x.tolist(), strict=True)),
+        "placement": None if outcome.x is None else _placement(task.cell, outcome.x),
         "claimed_objective": _number(outcome.objective),
         "evaluations": outcome.evaluations,
         "build_s": outcome.build_s,
@@ -125,13 +125,19 @@ def _record(task: Task, answer: Answer, names: tuple[str, ...], wall_s: float) -
                 "best": _number(step.best),
                 "mean": _number(step.mean),
                 "spread": _number(step.spread),
-                "x": np.round(step.x, 6).tolist(),
+                "placement": {name: round(v, 6) for name, v in _placement(task.cell, step.x).items()},
             }
             for step in outcome.trace
         ],
         "report": answer.report and answer.report.to_json(),
         "branches": answer.plan and answer.plan.branches,
     }
+
+
+def _placement(cell: Cell, x: np.ndarray) -> dict[str, float]:
+    """Return all coordinates of a placement by name, those the cell holds included; x may go on with joints."""
+    whole = cell.placement(x[: len(cell.variables)]).tolist()
+    return dict(zip(VARIABLES, whole, strict=True))
 
 
 def _number(value: float) -> float | None:

@@ -1,97 +1,22 @@
-"""The cell: robots, tools, workpiece, seam, search box and constraint levels, all frozen."""
+"""The cell: robots, tools, workpiece, seams, search box and constraint levels, all frozen."""
 
 import hashlib
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlpweld.cell.checked import Checked, Name, NonNegative, Positive, Sourced, Vector
+from nlpweld.cell.checked import Checked, Name, Vector
 from nlpweld.cell.complaint import nearest
-from nlpweld.cell.robot import Body, Robot
-from nlpweld.cell.task import Coupling, Posture, Saddle, Tee, Tool
+from nlpweld.cell.levels import WITHOUT_HANDLERS, Configuration, Constraints, Objective, Search
+from nlpweld.cell.robot import Body
+from nlpweld.cell.seams import Composite, Polyline
+from nlpweld.cell.station import Station
+from nlpweld.cell.task import Capsule, Positioner, Posture, Saddle, Tee, Workpiece
+from nlpweld.errors import OptionError
 
-READINGS = ("paper", "equal", "harmonic", "sqrt_tight", "millimetres")
-Reading = Literal["paper", "equal", "harmonic", "sqrt_tight", "millimetres"]
-RESERVED = ("main_pipe", "branch", "floor")
-
-
-class Station(Sourced):
-    """A robot at its place in the cell, with its tool and its coupling to the work."""
-
-    name: Name
-    robot: Robot
-    tool: Tool
-    base_position_m: Vector
-    base_rpy_deg: Vector = (0.0, 0.0, 0.0)
-    coupling: Coupling
-
-    @model_validator(mode="after")
-    def _bodies_are_told_apart(self) -> "Station":
-        names = [body.name for body in self.bodies]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"two bodies of robot and tool are named '{name}'; rename one")
-            if name in RESERVED:
-                raise ValueError(f"body '{name}' is named like the workpiece or the floor; rename it")
-        return self
-
-    @property
-    def bodies(self) -> tuple[Body, ...]:
-        """Capsules of arm and tool, from base to tip."""
-        return self.robot.bodies + self.tool.bodies
-
-
-class Search(Sourced):
-    """The placement box S for the origin of C in W [m]."""
-
-    lower_m: Vector
-    upper_m: Vector
-
-    @model_validator(mode="after")
-    def _box_is_ordered(self) -> "Search":
-        for axis, low, high in zip("xyz", self.lower_m, self.upper_m, strict=True):
-            if low >= high:
-                raise ValueError(f"lower_m.{axis} {low:g} is not below upper_m.{axis} {high:g}; swap them")
-        return self
-
-
-class Configuration(Sourced):
-    """Which inverse-kinematics branches may be used; ``any`` opens both sides."""
-
-    shoulder: Literal["front", "back", "any"]
-    elbow: Literal["up", "down", "any"]
-    wrist: Literal["flip", "noflip", "any"]
-
-
-class Constraints(Sourced):
-    """Levels that must hold along the whole seam, and the margins solvers keep at its points.
-
-    ``verify_step_m`` is the longest motion of any body end between two configurations the verifier looks at.
-    """
-
-    singularity_floor_m3: NonNegative
-    clearance_m: NonNegative
-    singularity_margin_m3: NonNegative
-    clearance_margin_m: NonNegative
-    joint_margin_deg: NonNegative
-    verify_step_m: Positive
-
-    @property
-    def floor_at_points_m3(self) -> float:
-        """The singularity floor with the margin solvers keep at the seam's points [m^3]."""
-        return self.singularity_floor_m3 + self.singularity_margin_m3
-
-    @property
-    def clearance_at_points_m(self) -> float:
-        """The clearance with the margin solvers keep at the seam's points [m]."""
-        return self.clearance_m + self.clearance_margin_m
-
-
-class Objective(Sourced):
-    """The reading of Pan et al., eq. (16)."""
-
-    reading: Reading
+VARIABLES = ("x_m", "y_m", "z_m", "yaw_rad")
+Seam = Annotated[Saddle | Composite | Polyline, Field(discriminator="curve")]
 
 
 class Cell(Checked):
@@ -100,8 +25,10 @@ class Cell(Checked):
     name: Name
     title: str
     stations: Annotated[tuple[Station, ...], Field(min_length=1)]
-    workpiece: Tee
-    seam: Saddle
+    positioner: Positioner | None = None
+    workpiece: Workpiece
+    seam: Seam
+    other_seams: Annotated[dict[Name, Seam], Field(default_factory=dict)]
     posture: Posture
     search: Search
     configuration: Configuration
@@ -111,29 +38,70 @@ class Cell(Checked):
 
     @model_validator(mode="after")
     def _names_are_told_apart(self) -> "Cell":
-        names = [s.name for s in self.stations]
+        names = [s.name for s in self.stations] + ([self.positioner.name] if self.positioner else [])
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"stations: two are named '{name}'; rename one")
+        fixed = [body.name for body in self.fixed_bodies]
+        for name in fixed:
+            if fixed.count(name) > 1 or name == "floor":
+                raise ValueError(f"workpiece, positioner: body name '{name}' is taken; rename one")
+        for station in self.stations:
+            for body in station.bodies:
+                if body.name in fixed:
+                    raise ValueError(
+                        f"stations.{station.name}: body '{body.name}' is named like a fixed one; rename it"
+                    )
         return self
 
     @model_validator(mode="after")
-    def _both_kinds_of_coupling_are_there(self) -> "Cell":
-        kinds = {s.coupling.kind for s in self.stations}
-        for kind, what in (("tight", "holds the workpiece"), ("loose", "welds")):
-            if kind not in kinds:
-                raise ValueError(f"stations: none is coupled '{kind}', so nothing {what}; couple at least one")
+    def _the_work_is_held_and_welded(self) -> "Cell":
+        kinds = [s.coupling.kind for s in self.stations]
+        if "loose" not in kinds:
+            raise ValueError("stations: none is coupled 'loose', so nothing welds; couple at least one")
+        if self.positioner is None and "tight" not in kinds:
+            raise ValueError("stations: none is coupled 'tight', so nothing holds the workpiece; couple at least one")
+        if self.positioner is not None and "tight" in kinds:
+            raise ValueError("stations: one is coupled 'tight' while a positioner holds the workpiece; take one away")
+        rule = "flat" if self.positioner is None else "upright"
+        if self.posture.rule != rule:
+            who = "a positioner" if self.positioner else "robots"
+            raise ValueError(f"posture.rule is '{self.posture.rule}'; where {who} hold the workpiece it is '{rule}'")
+        if "tight" not in kinds and self.objective.reading not in WITHOUT_HANDLERS:
+            raise ValueError(
+                f"objective.reading '{self.objective.reading}' tells handlers from welders, and there are no handlers; "
+                f"take one of {', '.join(WITHOUT_HANDLERS)}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _seams_go_together(self) -> "Cell":
+        if "main" in self.other_seams:
+            raise ValueError("other_seams.main: 'main' is the name of [seam]; rename it")
+        for name, seam in self.seams.items():
+            if isinstance(seam, Saddle) and not isinstance(self.workpiece, Tee):
+                raise ValueError(f"seam '{name}' is a saddle, which only a workpiece of shape 'tee' has")
+            if (seam.points, seam.closed) != (self.seam.points, self.seam.closed):
+                raise ValueError(f"other_seams.{name}: points and closed are not those of [seam]; seams run together")
+        for station in self.stations:
+            named = getattr(station.coupling, "seam", "main")
+            if named not in self.seams:
+                raise ValueError(
+                    f"stations.{station.name}.coupling.seam: no seam '{named}'; {nearest(named, self.seams)}"
+                )
         return self
 
     @model_validator(mode="after")
     def _exempt_pairs_exist(self) -> "Cell":
         works = [b.name for b in self.workpiece.bodies]
-        for station in self.stations:
-            known = {f"{b.name}/{w}" for b in station.bodies for w in works}
-            for pair in station.coupling.may_touch:
+        owners = [(f"stations.{s.name}.coupling", s.bodies, s.coupling.may_touch) for s in self.stations]
+        if self.positioner:
+            owners.append(("positioner", self.positioner.robot.bodies, self.positioner.may_touch))
+        for where, bodies, exempt in owners:
+            known = {f"{b.name}/{w}" for b in bodies for w in works}
+            for pair in exempt:
                 if pair not in known:
-                    where = f"stations.{station.name}.coupling.may_touch"
-                    raise ValueError(f"{where}: no pair '{pair}'; {nearest(pair, known)}")
+                    raise ValueError(f"{where}.may_touch: no pair '{pair}'; {nearest(pair, known)}")
         return self
 
     @model_validator(mode="after")
@@ -172,6 +140,45 @@ class Cell(Checked):
         return [station.coupling.kind == "tight" for station in self.stations]
 
     @property
+    def seams(self) -> dict[str, Seam]:
+        """All seams by name; ``main`` is the one that sets the posture."""
+        return {"main": self.seam, **self.other_seams}
+
+    @property
+    def fixed_bodies(self) -> tuple[Capsule | Body, ...]:
+        """Bodies of the workpiece, then of the positioner."""
+        return (*self.workpiece.bodies, *(self.positioner.robot.bodies if self.positioner else ()))
+
+    @property
+    def _free(self) -> np.ndarray:
+        lower, upper = self.search.bounds
+        return lower < upper
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of the coordinates of the placement that are free, in the order x_m, y_m, z_m, yaw_rad."""
+        return tuple(name for name, free in zip(VARIABLES, self._free, strict=True) if free)
+
+    @property
     def box(self) -> np.ndarray:
-        """Placement bounds, shape (2, 3) [m]."""
-        return np.array([self.search.lower_m, self.search.upper_m])
+        """Bounds of the free coordinates, shape (2, d) [m; rad]."""
+        return self.search.bounds[:, self._free]
+
+    def placement(self, x: np.ndarray) -> np.ndarray:
+        """Return x, y, z [m] and yaw [rad] of the placement frame for free coordinates x, shape (4,)."""
+        whole = self.search.bounds[0].copy()
+        whole[self._free] = x
+        return whole
+
+    def coordinates(self, placement: np.ndarray) -> np.ndarray:
+        """Return the free coordinates (d,) of a placement (3,) [m] or (4,) [m; rad].
+
+        Raises:
+            OptionError: a coordinate that the cell holds has another value.
+        """
+        given = self.search.bounds[0].copy()
+        given[: len(placement)] = placement
+        for name, free, value, held in zip(VARIABLES, self._free, given, self.search.bounds[0], strict=True):
+            if not free and abs(value - held) > 1e-12:
+                raise OptionError(f"{self.name}: {name} is held at {held:g} and cannot be {value:g}; open [search]")
+        return given[self._free]

@@ -1,27 +1,15 @@
-"""Cell and robot files: found by name or path, read as TOML, checked, and turned into frozen types."""
+"""Cell and robot files, turned into frozen types."""
 
-import os
-import tomllib
-from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import ValidationError
+from typing import Any
 
 from nlpweld.cell.cell import Cell
-from nlpweld.cell.checked import Checked
-from nlpweld.cell.complaint import first_complaint, nearest
+from nlpweld.cell.complaint import nearest
+from nlpweld.cell.files import checked, find, read_toml
 from nlpweld.cell.robot import Robot
+from nlpweld.cell.seam_csv import with_rows
 from nlpweld.cell.task import Tool
 from nlpweld.errors import CellError
-
-Model = TypeVar("Model", bound=Checked)
-LIBRARY = Path(str(resources.files("nlpweld"))) / "library"
-
-
-def library_names(kind: str) -> list[str]:
-    """Return the built-in names of one kind, ``cells`` or ``robots``, sorted."""
-    return sorted(path.stem for path in (LIBRARY / kind).glob("*.toml"))
 
 
 def load_cell(name_or_path: str | Path) -> Cell:
@@ -39,6 +27,12 @@ def load_cell(name_or_path: str | Path) -> Cell:
         unused.discard(str(station.get("tool")))
         station["robot"] = _robot_data(station.get("robot"), path, where)
         station["tool"] = _named(tools, station.get("tool"), path, f"{where}.tool")
+    if isinstance(data.get("positioner"), dict):
+        data["positioner"]["robot"] = _robot_data(data["positioner"].get("robot"), path, "positioner", "positioners")
+    for seam in (data.get("seam"), *_tables(data.get("other_seams"))):
+        if isinstance(seam, dict):
+            seam |= with_rows(seam, path.parent)
+            seam.pop("file", None)
     for name in sorted(unused):
         raise CellError(f"{path}: tools.{name}: no station uses it; remove it or name it in a station")
     data.setdefault("name", path.stem)
@@ -55,52 +49,14 @@ def load_robot(name_or_path: str | Path) -> Robot:
     return checked(Robot, {"name": path.stem, **read_toml(path)}, path)
 
 
-def find(name_or_path: str | Path, kind: str, beside: Path | None = None) -> Path:
-    """Return the file meant by a built-in name or a path; relative paths may also start beside a given file.
+def load_positioner(name_or_path: str | Path) -> Robot:
+    """Load a built-in positioner by name, or any positioner by the path of its TOML file.
 
     Raises:
-        CellError: neither a file nor a built-in name; lists the names there are.
+        CellError: the file is missing, is not TOML, or breaks the schema.
     """
-    text = str(name_or_path)
-    names = library_names(kind)
-    if text in names:
-        return LIBRARY / kind / f"{text}.toml"
-    for path in (Path(text), beside.parent / text if beside else Path(text)):
-        if os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises where a name is too long
-            return path
-    raise CellError(f"{text}: no such file and no built-in {kind[:-1]} of that name; {nearest(text, names)}")
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read one TOML file.
-
-    Raises:
-        CellError: the file cannot be read or is not TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CellError(f"{path}: cannot be read ({error.strerror}); check the path and its permissions") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CellError(f"{path}: not TOML: {error}; mend the syntax there") from None
-
-
-def checked(model: type[Model], data: Any, path: Path, where: str = "") -> Model:
-    """Build a model from plain data, strictly.
-
-    Args:
-        model: what to build.
-        data: a table of the file.
-        path: the file, for the message.
-        where: which table of the file it is; empty for the whole.
-
-    Raises:
-        CellError: a field is missing, unknown, of the wrong kind, or contradicts another.
-    """
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        raise CellError(f"{path}: {first_complaint(error, data, where)}") from None
+    path = find(name_or_path, "positioners")
+    return checked(Robot, {"name": path.stem, **read_toml(path)}, path)
 
 
 def _tools(value: Any, path: Path) -> dict[str, Any]:
@@ -118,11 +74,15 @@ def _stations(data: dict[str, Any], path: Path) -> list[dict[str, Any]]:
     return stations
 
 
-def _robot_data(name: Any, path: Path, where: str) -> dict[str, Any]:
+def _tables(value: Any) -> list[Any]:
+    return list(value.values()) if isinstance(value, dict) else []
+
+
+def _robot_data(name: Any, path: Path, where: str, kind: str = "robots") -> dict[str, Any]:
     if not isinstance(name, str):
         raise CellError(f"{path}: {where}.robot: missing or not a name; name a robot of the library or a file")
     try:
-        found = find(name, "robots", beside=path)
+        found = find(name, kind, beside=path)
     except CellError as error:
         raise CellError(f"{path}: {where}.robot: {error}") from None
     robot = {"name": found.stem, **read_toml(found)}

@@ -43,7 +43,8 @@ def show(cell: CellName, json: Json = False) -> None:
 def evaluate(
     cell: CellName,
     at: Annotated[
-        tuple[float, float, float] | None, typer.Option(metavar="X Y Z", help="origin of the workpiece in W [m]")
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y Z", help="where workpiece or positioner is put in W [m]"),
     ] = None,
     placement: Annotated[
         str | None, typer.Option(metavar="NAME", help="a placement named in the cell file, instead of --at")

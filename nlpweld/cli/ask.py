@@ -59,10 +59,11 @@ def evaluate(
     Raises:
         OptionError: a robot cannot reach the seam there, so there is nothing to measure.
     """
-    from nlpweld.bench.answer import evaluate_plan
+    from nlpweld.bench.answer import coordinates, evaluate_plan
     from nlpweld.formulation.reduced import reduced
 
-    x = np.array(_where(cell, at, placement))
+    where = _where(cell, at, placement)
+    x = coordinates(cell, where)
     if out is not None:
         writable(out.parent)
     plan, report = evaluate_plan(reduced(cell, engine="numpy"), x)
@@ -73,7 +74,7 @@ def evaluate(
     if plan is None:
         blame = report.violations[0]
         raise OptionError(
-            f"{cell.name}: placement ({', '.join(f'{c:g}' for c in x)}) is out of reach of {blame.robot} "
+            f"{cell.name}: placement ({', '.join(f'{c:g}' for c in where)}) is out of reach of {blame.robot} "
             f"at seam point {blame.point}; choose one nearer to its base"
         )
     if not json:
@@ -110,7 +111,7 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
         "seed": asked.seed,
         "status": outcome.status,
         "message": outcome.message,
-        "placement": None if outcome.x is None else outcome.x.tolist(),
+        "placement": None if outcome.x is None else _placement(asked.cell, outcome.x),
         "evaluations": outcome.evaluations,
         "build_s": round(outcome.build_s, 4),
         "solve_s": round(outcome.solve_s, 4),
@@ -161,6 +162,12 @@ def _where(cell: Cell, at: tuple[float, float, float] | None, placement: str | N
             f"--placement '{placement}' is not in the cell. There are: {', '.join(cell.placements) or 'none'}"
         )
     return cell.placements[placement]
+
+
+def _placement(cell: Cell, x: np.ndarray) -> list[float]:
+    """Return x, y, z [m], and yaw [rad] where it is free; x may go on with joints."""
+    whole = cell.placement(x[: len(cell.variables)]).tolist()
+    return whole if "yaw_rad" in cell.variables else whole[:3]
 
 
 def _start(plan: Plan | None) -> dict[str, Any]:

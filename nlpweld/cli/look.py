@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from nlpweld.cell import library_names, load_cell, load_robot
+from nlpweld.cell import library_names, load_cell, load_positioner, load_robot
 from nlpweld.cell.checked import Checked, Sourced, holds_number
 from nlpweld.cli.ask import Question, writable
 
@@ -24,6 +24,7 @@ def cells(json: bool) -> None:
     found = {
         "cells": {name: load_cell(name).title for name in library_names("cells")},
         "robots": {name: load_robot(name).title for name in library_names("robots")},
+        "positioners": {name: load_positioner(name).title for name in library_names("positioners")},
         "solvers": {name: ", ".join(presets(name)) for name in solver_names()},
     }
     if json:

@@ -8,7 +8,7 @@ count from the end, and never the result's own, so that LLVM can vectorise over 
 # ruff: noqa: F821
 # mypy: ignore-errors
 
-from math import exp, log1p, sqrt
+from math import cos, exp, log1p, sin, sqrt
 
 import numpy as np
 
@@ -113,6 +113,10 @@ def smooth_unary(w, op, p, f, g, h):
         for j in range(W):
             value = exp(w[p + j])
             w[f + j], w[g + j], w[h + j] = value, value, value
+    elif op == SIN or op == COS:
+        for j in range(W):
+            s, c = sin(w[p + j]), cos(w[p + j])
+            w[f + j], w[g + j], w[h + j] = (s, c, -s) if op == SIN else (c, -s, -c)
     else:
         for j in range(W):
             slope = 1.0 / (1.0 + w[p + j])
@@ -184,7 +188,7 @@ def step(w, op, r, p, p_rows, q, q_rows, spare):
     elif op == POW or op == CONSTPOW:
         power(w, p, q, f, g, h)
         outer(w, r, p, p_rows, f, g, h)
-    elif op == SQ or op == SQRT or op == EXP or op == LOG1P:
+    elif op == SQ or op == SQRT or op == EXP or op == LOG1P or op == SIN or op == COS:
         smooth_unary(w, op, p, f, g, h)
         outer(w, r, p, p_rows, f, g, h)
     else:

@@ -21,7 +21,7 @@ LANES = 72  # taken at once: fewer cost more overhead; the usual number of seam 
 CONST, INPUT, OUTPUT = ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT
 FLAT = ("LT", "LE", "NOT")  # without derivative
 BINARY = ("ADD", "SUB", "MUL", "DIV", "FMIN", "FMAX", "LT", "LE", "IF_ELSE_ZERO", "POW", "CONSTPOW")
-UNARY = ("NEG", "TWICE", "SQ", "SQRT", "INV", "EXP", "LOG1P", "FABS", "NOT", "ASSIGN")
+UNARY = ("NEG", "TWICE", "SQ", "SQRT", "INV", "EXP", "LOG1P", "SIN", "COS", "FABS", "NOT", "ASSIGN")
 STEPS = (
     jet_steps.product,
     jet_steps.chain,
@@ -120,7 +120,7 @@ def machine(variables: int, lanes: int = LANES) -> Any:
     """Return the compiled machine for a number of variables."""
     rows = 1 + variables + variables * (variables + 1) // 2
     known = {**numbers(BINARY), **numbers(UNARY), CONST: "CONST", INPUT: "INPUT", OUTPUT: "OUTPUT"}
-    head = ["from math import exp, log1p, sqrt", "", "import numba", "import numpy as np", ""]
+    head = ["from math import cos, exp, log1p, sin, sqrt", "", "import numba", "import numpy as np", ""]
     head += [f"{name} = {number}" for number, name in known.items()]
     head += [f"{name} = np.uint64({value})" for name, value in (("D", variables), ("W", lanes), ("JET", rows))]
     jitted = [(JIT if step is jet_steps.run else INNER) + inspect.getsource(step) for step in STEPS]

@@ -27,10 +27,12 @@ PATTERNS = {
     ca.OP_IF_ELSE_ZERO: "({1} if {0} != 0.0 else 0.0)",
     ca.OP_FABS: "abs({0})",
     ca.OP_NOT: "1.0 * ({0} == 0.0)",
+    ca.OP_SIN: "sin({0})",
+    ca.OP_COS: "cos({0})",
     ca.OP_POW: "{0} ** {1}",
     ca.OP_CONSTPOW: "{0} ** {1}",
 }
-HEAD = "from math import sqrt\n\nimport numba\n\n\n"
+HEAD = "from math import cos, sin, sqrt\n\nimport numba\n\n\n"
 JIT = "@numba.njit(error_model='numpy', cache=True)\n"
 # for what only other compiled functions call: without wrappers it compiles in half the time
 INNER = "@numba.njit(error_model='numpy', no_cpython_wrapper=True, no_cfunc_wrapper=True)\n"

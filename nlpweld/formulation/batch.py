@@ -29,7 +29,7 @@ class Evaluator(Protocol):
 
 @dataclass(frozen=True)
 class Batch:
-    """Evaluates placements of one cell, X (m, 3) [m], at the cell's own seam points with the solvers' margins.
+    """Evaluates placements of one cell, X (m, d), at the cell's own seam points with the solvers' margins.
 
     Reach, joint limits and singularity come first; velocity ellipsoids (and so the objective) and clearances are
     looked at only for candidates that keep them or lack less than a tenth of the singularity floor, and clearances
@@ -61,7 +61,7 @@ class Batch:
 
     @cached_property
     def points(self) -> np.ndarray:
-        """The data of every seam point, shape (12, N)."""
+        """The data of every seam point, shape (k, N)."""
         return point_data(self.cell, seam_parameters(self.cell))
 
     @property
@@ -83,5 +83,5 @@ class Batch:
         self.evaluate(self.cell.box.mean(axis=0))
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
-        """Return objective, violations and best mode of placements X, shape (m, 3) [m]."""
+        """Return objective, violations and best mode of placements X (m, d), free coordinates [m; rad]."""
         return self._evaluator.evaluate(np.atleast_2d(np.asarray(X, dtype=float)))

@@ -2,9 +2,9 @@
 
 Nothing here runs as it stands: :mod:`nlpweld.formulation.fused` compiles these functions in one module with the
 kernels of a cell's graphs, which they call as ``grip``, ``limbs``, ``work``, ``gap`` and ``value``, and with the
-constants ``N`` (seam points), ``NEAR`` and ``GAP_SCALE_M``. Everything a candidate needs fits the innermost cache,
-nothing is written for it but its verdict, and what cannot change the verdict is not computed: these are the steps of
-the array form (:mod:`~.staged`), one candidate at a time.
+constants ``N`` (seam points), ``CLOSED``, ``NEAR`` and ``GAP_SCALE_M``. Everything a candidate needs fits the innermost
+cache, nothing is written for it but its verdict, and what cannot change the verdict is not computed: these are the
+steps of the array form (:mod:`~.staged`), one candidate at a time.
 """
 # ruff: noqa: F821
 # mypy: ignore-errors
@@ -162,12 +162,12 @@ def angle(r):
 
 
 def joint_range(cos, sin, ranks):
-    """Return least and greatest angle over the closed path, unwrapped."""
+    """Return least and greatest angle over the path, unwrapped, the way back of a closed seam included."""
     rank(cos, sin, ranks)
     low, high = least(ranks), greatest(ranks)
     if high - low > 2.0:  # a path that never spans half a turn has no cut to unwrap
         turns, low, high = 0.0, ranks[0], ranks[0]
-        for j in range(N):
+        for j in range(N if CLOSED else N - 1):
             following = ranks[j + 1] if j + 1 < N else ranks[0]
             step = following - ranks[j]
             turns += 4.0 * ((step < -2.0) - 1.0 * (step > 2.0))

@@ -45,12 +45,13 @@ STEPS = (
     candidate.missed_by,
     candidate.judge,
 )
-HEAD = """from math import atan2, copysign, floor, inf, isfinite, isnan, nan, pi, sqrt
+HEAD = """from math import atan2, copysign, cos, floor, inf, isfinite, isnan, nan, pi, sin, sqrt
 
 import numba
 import numpy as np
 
 N = {n}
+CLOSED = {closed}
 NEAR = {near!r}
 GAP_SCALE_M = {scale!r}
 """
@@ -139,7 +140,7 @@ def source(stage: Stage, n: int) -> str:
     kernels["work"] = stage.work, ("candidate", "point")
     kernels["gap"] = stage.gap, ("lane", "lane", "number")
     kernels["value"] = value_graph(stage.cell), ("lane", "lane")
-    parts = [HEAD.format(n=n, near=NEAR, scale=GAP_SCALE_M)]
+    parts = [HEAD.format(n=n, closed=stage.cell.seam.closed, near=NEAR, scale=GAP_SCALE_M)]
     parts += [INNER + kernel_source(f, kinds, n, name) for name, (f, kinds) in kernels.items()]
     stations = range(len(stage.grips))
     parts.append(_switch("grip", "x, points, signs, cos_sin, w, reach", stations))

@@ -9,19 +9,21 @@ from nlpweld.cell.robot import Robot
 from nlpweld.engine.lanes import Lanes
 
 
-def joint_paths(robot: Robot, cos_sin: Lanes) -> np.ndarray:
-    """Return continuous joint paths of the noflip wrist, closed by a repeat of the first point.
+def joint_paths(robot: Robot, cos_sin: Lanes, closed: bool) -> np.ndarray:
+    """Return continuous joint paths of the noflip wrist; those of a closed seam repeat the first point at the end.
 
     Args:
         robot: a six-axis robot; its DH offsets are taken off.
         cos_sin: twelve arrays (m, N): cosines, then sines, of the DH angles.
+        closed: whether the seam is.
 
     Returns:
-        q, shape (m, 6, N + 1) [rad], unwrapped along the last axis.
+        q, shape (m, 6, N) or, closed, (m, 6, N + 1) [rad], unwrapped along the last axis.
     """
     cos, sin = np.stack(list(cos_sin[:6]), axis=1), np.stack(list(cos_sin[6:]), axis=1)
     theta = np.arctan2(sin, cos)
-    theta = np.concatenate([theta, theta[..., :1]], axis=-1)
+    if closed:
+        theta = np.concatenate([theta, theta[..., :1]], axis=-1)
     return np.unwrap(theta, axis=-1) - robot.dh[:, 3][:, None]
 
 
@@ -56,17 +58,18 @@ def limit_margins(robot: Robot, q: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Joint limits and DH offsets of a robot as arrays, shape (n,) [rad]."""
+    """Joint limits and DH offsets of a robot as arrays, shape (n,) [rad], and whether its paths close."""
 
     lower: np.ndarray
     upper: np.ndarray
     offset: np.ndarray
+    closed: bool
 
     @staticmethod
-    def of(robot: Robot) -> "Limits":
-        """Return the limits of a robot."""
+    def of(robot: Robot, closed: bool) -> "Limits":
+        """Return the limits of a robot along a closed or open seam."""
         lower, upper = robot.limits_rad.T
-        return Limits(lower, upper, robot.dh[:, 3])
+        return Limits(lower, upper, robot.dh[:, 3], closed)
 
 
 def best_wrist(limits: Limits, cos_sin: Lanes, wrists: Sequence[str], need: float) -> tuple[np.ndarray, np.ndarray]:
@@ -108,7 +111,7 @@ def _margins(limits: Limits, low: np.ndarray, high: np.ndarray, need: float) -> 
 
 
 def _ranges(limits: Limits, cos_sin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return least and greatest joint angles over closed paths, cos_sin (12, m, N), the way back included, (6, m)."""
+    """Return least and greatest joint angles over paths, cos_sin (12, m, N), a closed one's way back too, (6, m)."""
     theta = np.arctan2(cos_sin[6:], cos_sin[:6])
     low, high = theta.min(axis=2), theta.max(axis=2)
     jumping = high - low > np.pi  # a path that never spans half a turn has no cut to unwrap
@@ -116,7 +119,7 @@ def _ranges(limits: Limits, cos_sin: np.ndarray) -> tuple[np.ndarray, np.ndarray
         cut = theta[jumping]
         step = np.diff(cut, axis=1, append=cut[:, :1])
         turns = 2 * np.pi * np.cumsum((step < -np.pi).astype(float) - (step > np.pi), axis=1)
-        end = cut[:, 0] + turns[:, -1]
+        end = cut[:, 0] + (turns[:, -1] if limits.closed else 0.0)
         cut[:, 1:] += turns[:, :-1]
         low[jumping], high[jumping] = np.minimum(cut.min(axis=1), end), np.maximum(cut.max(axis=1), end)
     return low - limits.offset[:, None], high - limits.offset[:, None]

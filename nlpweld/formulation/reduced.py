@@ -1,4 +1,4 @@
-"""The reduced form: three placement variables, joints eliminated by inverse kinematics."""
+"""The reduced form: the placement's coordinates are the variables, joints eliminated by inverse kinematics."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,6 +7,7 @@ import numpy as np
 
 from nlpweld.cell.cell import Cell
 from nlpweld.formulation.batch import CONSTRAINTS, Batch
+from nlpweld.formulation.holder import held
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, on_wrist, settle
 from nlpweld.formulation.smooth import Gaps, near_gaps, relaxation
@@ -31,7 +32,10 @@ class OutOfReach:
 
 
 def reduced(cell: Cell, engine: str = "auto") -> Nlp:
-    """Return the reduced form of a cell: variables are the origin of C in W [m] (Pan et al., the three genes).
+    """Return the reduced form of a cell: variables are the free coordinates of its placement [m; rad].
+
+    Those are the origin of C in W for Pan et al. (the three genes), and where the positioner stands, (HD, FB), for
+    Zhang et al.
 
     Args:
         cell: the cell.
@@ -41,7 +45,7 @@ def reduced(cell: Cell, engine: str = "auto") -> Nlp:
     return Nlp(
         problem=cell.name,
         formulation="reduced",
-        names=("x_m", "y_m", "z_m"),
+        names=cell.variables,
         lower=cell.box[0],
         upper=cell.box[1],
         constraints=CONSTRAINTS,
@@ -101,8 +105,9 @@ class Unpacker:
     batch: Batch
 
     def __call__(self, x: np.ndarray, mode: int) -> Plan | OutOfReach:
-        """Return the plan of placement x (3,) [m] on a mode's branches, or who cannot reach which point."""
+        """Return the plan of placement x (d,) on a mode's branches, or who cannot reach which point."""
         cell, paths, branches = self.batch.cell, {}, {}
+        closed = cell.seam.closed
         for k, station in enumerate(cell.stations):
             shoulder, elbow = self.batch.modes[mode][k]
             cos_sin, reach = self._solve(k, x, (shoulder, elbow))
@@ -111,18 +116,22 @@ class Unpacker:
             lanes = cos_sin[:, None, :]
             wrists = allowed(cell.configuration.wrist, WRIST)
             need = np.radians(cell.constraints.joint_margin_deg)
-            wrist = wrists[best_wrist(Limits.of(station.robot), lanes, wrists, need)[1][0]]
-            q = settle(station.robot, on_wrist(station.robot, joint_paths(station.robot, lanes), wrist), need)
-            paths[station.name] = q[0, :, :-1].T
+            wrist = wrists[best_wrist(Limits.of(station.robot, closed), lanes, wrists, need)[1][0]]
+            q = settle(station.robot, on_wrist(station.robot, joint_paths(station.robot, lanes, closed), wrist), need)
+            paths[station.name] = q[0, :, : lanes.shape[2]].T
             branches[station.name] = (shoulder, elbow, wrist)
-        return Plan(cell, np.asarray(x, dtype=float), seam_parameters(cell), paths, branches)
+        s, placement = seam_parameters(cell), cell.placement(x)
+        turned = held(cell, s).q
+        if cell.positioner and turned is not None:
+            paths[cell.positioner.name] = turned
+        return Plan(cell, placement[:3], s, paths, branches, float(placement[3]))
 
     def _solve(self, k: int, x: np.ndarray, branch: tuple[str, str]) -> tuple[np.ndarray, np.ndarray]:
         """Return cosines and sines (12, N) and reach (N,) of station k by the CasADi graph itself."""
         points = self.batch.points
         n = points.shape[1]
         out = self.batch.stage.arms[k].map(n)(
-            np.repeat(np.reshape(x, (3, 1)), n, axis=1), points, np.array([signs((*branch, "noflip"))] * n).T
+            np.repeat(np.reshape(x, (-1, 1)), n, axis=1), points, np.array([signs((*branch, "noflip"))] * n).T
         )
         cos_sin = np.array(out[0]).reshape(6, n, 2).transpose(2, 0, 1).reshape(12, n)
         return cos_sin, np.array(out[3]).ravel()

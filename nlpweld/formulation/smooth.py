@@ -39,7 +39,7 @@ def all_gaps(stage: Stage) -> Gaps:
 
 
 def near_gaps(stage: Stage, mode: Mode, X: np.ndarray, within_m: float) -> Gaps:
-    """Return the distances that fall below a bound somewhere on the seam at any of some placements X (m, 3) [m]."""
+    """Return the distances that fall below a bound somewhere on the seam at any of some placements X (m, d)."""
     points = point_data(stage.cell, seam_parameters(stage.cell))
     m, n = len(X), points.shape[1]
     x, point = np.repeat(X, n, axis=0).T, np.tile(points, m)
@@ -75,8 +75,8 @@ def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, engine: str =
 
 def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
     """Return ``(x, point, sharpness) ->`` what one of n seam points adds to the objective."""
-    x, point, sharpness = ca.SX.sym("x", 3), ca.SX.sym("point", 12), ca.SX.sym("sharpness")
-    cell = stage.cell
+    cell, arm = stage.cell, stage.arms[0]
+    x, point, sharpness = ca.SX.sym("x", arm.nnz_in(0)), ca.SX.sym("point", arm.nnz_in(1)), ca.SX.sym("sharpness")
     arms = [arm(x, point, _branch(b)) for arm, b in zip(stage.arms, mode, strict=True)]
     constraints = [g for k in range(len(arms)) for g in _robot_constraints(cell, k, arms[k])]
     ends = [*(arm[4] for arm in arms), stage.work(x, point)]

@@ -15,11 +15,14 @@ from itertools import combinations
 import casadi as ca
 import numpy as np
 
-from nlpweld.cell.cell import Cell, Station
+from nlpweld.cell.cell import Cell
 from nlpweld.cell.robot import Body
+from nlpweld.cell.station import Station
 from nlpweld.errors import KinematicsError
-from nlpweld.formulation.coupling import base_pose, flange_pose, weld_point
+from nlpweld.formulation.coupling import base_pose, flange_pose, moving_bodies, placement_frame, weld_point
+from nlpweld.formulation.holder import held
 from nlpweld.geometry.capsules import segment_distance
+from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.chain import Chain, Frame, constant, jacobian_of, rpy_pose
 from nlpweld.kinematics.ik import SphericalArm, spherical_arm
 from nlpweld.kinematics.manipulability import det_gram
@@ -40,10 +43,11 @@ class Shape:
 
 @dataclass(frozen=True)
 class Stage:
-    """The graphs of one cell. Placement x is the origin of C in W, shape (3, 1) [m].
+    """The graphs of one cell. Placement x holds the free coordinates of the placement frame {P} in W [m; rad].
 
-    Owners of bodies are numbered: the stations in their order, then the workpiece. Ends of an owner's bodies are
-    (3, 2b) [m] in W: start and end of one body beside the other.
+    Owners of bodies are numbered: the stations in their order, then the work, which is the workpiece and the
+    positioner that holds it. Ends of an owner's bodies are (3, 2b) [m] in W: start and end of one body beside the
+    other.
     """
 
     cell: Cell
@@ -65,11 +69,29 @@ class Stage:
 
     @cached_property
     def work(self) -> ca.Function:
-        """``(x, point) -> ends`` of the workpiece's bodies."""
-        x, point = ca.SX.sym("x", 3), weld_point()
-        T_W_C = Frame(point.R_W_C, x)
+        """``(x, point) -> ends`` of the workpiece's bodies, then of the positioner's."""
+        x, point = self._x, weld_point(self.cell)
+        T_W_P = placement_frame(self.cell, x)
+        T_W_C = T_W_P @ point.T_P_C
         ends = [T_W_C.point(p) for body in self.cell.workpiece.bodies for p in (body.start_m, body.end_m)]
+        ends += [T_W_P.point(p) for p in self._positioner_ends(point.ends_P)]
         return _function("work", [x, point.vector], [ca.horzcat(*ends)], ["x", "point"], ["ends"])
+
+    def _positioner_ends(self, moving_P: ca.SX) -> list[ca.SX]:
+        """Return the ends of the positioner's bodies in {P}: numbers where the body is fixed, else as given."""
+        if self.cell.positioner is None:
+            return []
+        robot, moving = self.cell.positioner.robot, moving_bodies(self.cell)
+        base = constant(rpy_pose(self.cell.positioner.base_position_m, self.cell.positioner.base_rpy_deg))
+        fixed = [[base.point(end.at_m) for end in (body.start, body.end)] for body in robot.bodies]
+        given = ca.horzsplit(moving_P) if moving else []
+        for k, i in enumerate(moving):
+            fixed[i] = given[2 * k : 2 * k + 2]
+        return [end for ends in fixed for end in ends]
+
+    @property
+    def _x(self) -> ca.SX:
+        return ca.SX.sym("x", len(self.cell.variables))
 
     @cached_property
     def shapes(self) -> tuple[tuple[Shape, ...], ...]:
@@ -82,7 +104,16 @@ class Stage:
             Shape(b.name, b.radius_m, float(np.sum(np.subtract(b.end_m, b.start_m) ** 2)))
             for b in self.cell.workpiece.bodies
         ]
+        table = self.cell.positioner.robot.bodies if self.cell.positioner else ()
+        moving = moving_bodies(self.cell)
+        works += [Shape(b.name, b.radius_m, self._sq_lengths[i], i in moving) for i, b in enumerate(table)]
         return (*robots, tuple(works))
+
+    @cached_property
+    def _sq_lengths(self) -> list[float]:
+        """Squared lengths of the positioner's bodies [m^2], which are rigid: read off at the first point."""
+        ends = held(self.cell, seam_parameters(self.cell)).ends_P[0]
+        return [float(length) for length in np.sum((ends[:, 1] - ends[:, 0]) ** 2, axis=-1)]
 
     @cached_property
     def pairs(self) -> dict[Owners, tuple[Owners, ...]]:
@@ -122,10 +153,11 @@ class Stage:
         return _function("gap", [a, b, numbers], [gap], ["ends_a", "ends_b", "numbers"], ["gap"])
 
     def _grip(self, station: Station) -> ca.Function:
-        x, point, branch = ca.SX.sym("x", 3), weld_point(), ca.SX.sym("branch", 3)
-        arm = self._inverse(station)
-        found = arm.solve(flange_pose(station, Frame(point.R_W_C, x), point.p_C), branch)
-        outputs = [ca.horzcat(found.cos, found.sin), arm.abs_det_jacobian(found), found.reach]
+        x, point, branch = self._x, weld_point(self.cell), ca.SX.sym("branch", 3)
+        T_W_C = placement_frame(self.cell, x) @ point.T_P_C
+        target = point.targets[self.cell.stations.index(station)]
+        found = self._inverse(station).solve(flange_pose(station, T_W_C, target), branch)
+        outputs = [ca.horzcat(found.cos, found.sin), self._inverse(station).abs_det_jacobian(found), found.reach]
         inputs = [x, point.vector, branch]
         return _function(f"grip_{station.name}", inputs, outputs, ["x", "point", "branch"], ["cos_sin", "w", "reach"])
 
@@ -138,7 +170,7 @@ class Stage:
         return _function(f"limbs_{station.name}", [cos_sin], outputs, ["cos_sin"], ["gram", "ends"])
 
     def _arm(self, k: int) -> ca.Function:
-        x, point, branch = ca.SX.sym("x", 3), weld_point().vector, ca.SX.sym("branch", 3)
+        x, point, branch = self._x, weld_point(self.cell).vector, ca.SX.sym("branch", 3)
         cos_sin, w, reach = self.grips[k](x, point, branch)
         gram, ends = self.limbs[k](cos_sin)
         name, names = f"arm_{self.cell.stations[k].name}", ["cos_sin", "w", "gram", "reach", "ends"]

@@ -62,7 +62,7 @@ class Staged:
 
     @cached_property
     def _joint_limits(self) -> list[Limits]:
-        return [Limits.of(station.robot) for station in self.cell.stations]
+        return [Limits.of(station.robot, self.cell.seam.closed) for station in self.cell.stations]
 
     @cached_property
     def _grips(self) -> list[Kernel]:

@@ -11,7 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from nlpweld.cell.cell import Reading
+from nlpweld.cell.levels import READINGS, Reading
 
 
 def manipulability(J: ca.SX) -> ca.SX:
@@ -30,7 +30,7 @@ def det_gram(J_v: ca.SX) -> ca.SX:
 
 
 # m^3 in the reading's unit of volume
-UNIT: dict[str, float] = {"paper": 1.0, "equal": 1.0, "harmonic": 1.0, "sqrt_tight": 1.0, "millimetres": 1e9}
+UNIT: dict[str, float] = dict.fromkeys(READINGS, 1.0) | {"millimetres": 1e9}
 
 
 def magnitude(reading: Reading, tight: Sequence[bool]) -> float:
@@ -48,14 +48,20 @@ def mmr(reading: Reading, w: Sequence[Any], gram: Sequence[Any], tight: Sequence
     Args:
         reading: ``paper`` is (16) as it stands; ``equal`` weighs both parts alike; ``harmonic`` takes the weighted
             harmonic mean; ``sqrt_tight`` takes the geometric mean of the tight robots instead of their product, so
-            that both parts are in m^3; ``millimetres`` is (16) with lengths in mm.
+            that both parts are in m^3; ``millimetres`` is (16) with lengths in mm. ``product`` and ``mean`` are those
+            of all robots, for cells in which none is tightly coupled.
         w: manipulability of each robot [m^3].
         gram: det(J_v J_v^T) of each robot [m^6].
         tight: for each robot whether it is tightly coupled.
 
     Returns:
-        MMR; its unit mixes (m^3)^n_tight with m^3 under ``paper`` (mm under ``millimetres``).
+        MMR; its unit mixes (m^3)^n_tight with m^3 under ``paper`` (mm under ``millimetres``); (m^3)^n under
+        ``product``, m^3 under ``mean``.
     """
+    if reading == "product":
+        return _product(list(w))
+    if reading == "mean":
+        return sum(w) / len(w)
     unit = UNIT[reading]
     m_tight = _product([unit * wk for wk, t in zip(w, tight, strict=True) if t])
     m_loose = _product([unit * wk for wk, t in zip(w, tight, strict=True) if not t])

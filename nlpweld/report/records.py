@@ -146,7 +146,7 @@ def _report(path: Path, report: dict[str, Any] | None) -> dict[str, Any]:
 def _step(path: Path, index: int, step: dict[str, Any]) -> dict[str, Any]:
     try:
         numbers = {name: _number(step[name]) for name in ("time_s", "evaluations", "best", "mean")}
-        at = dict(zip(AXES, (float(v) for v in step["x"]), strict=False))  # joints may follow
+        at = {name: _number(step["placement"].get(name)) for name in AXES}
         return {"step": index, **numbers, "spread_m": _number(step["spread"]), **at}
     except (KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path}: trace: {_what(error)}; remove the record and run it again") from None

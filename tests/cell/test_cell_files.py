@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from nlpweld.cell import load_cell
-from nlpweld.cell.load import LIBRARY
+from nlpweld.cell.files import LIBRARY
 from nlpweld.errors import CellError
 
 SOUND = (LIBRARY / "cells" / "three_er16.toml").read_text(encoding="utf-8")

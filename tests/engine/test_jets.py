@@ -31,6 +31,8 @@ EXPRESSIONS = {
     "square root": ca.sqrt(inner),
     "power": inner ** (-0.5),
     "exponential": ca.exp(-inner),
+    "sine": ca.sin(inner * x[1]),
+    "cosine": ca.cos(inner - x[2]),
     "logarithm": ca.log1p(inner**2),
     "least": ca.fmin(inner, point[1] + x[0] * x[2]),
     "greatest": ca.fmax(inner * x[0], point[0]),

@@ -33,22 +33,30 @@ def cosines_and_sines(robot: Robot, q: np.ndarray) -> list[np.ndarray]:
 @given(robots, seeds)
 def test_paths_without_jumps_come_back_from_cosines_and_sines_up_to_whole_turns(robot: Robot, seed: int) -> None:
     q = smooth_paths(seed)
-    turns = (joint_paths(robot, cosines_and_sines(robot, q)) - q) / (2 * np.pi)
+    turns = (joint_paths(robot, cosines_and_sines(robot, q), closed=True) - q) / (2 * np.pi)
     assert turns == pytest.approx(np.round(turns[..., :1]) + 0 * turns, abs=1e-12)
 
 
 @given(robots, seeds)
 def test_joint_paths_take_no_step_longer_than_half_a_turn(robot: Robot, seed: int) -> None:
     jumps = np.random.default_rng(seed).uniform(-np.pi, np.pi, (3, 6, 21))
-    assert np.abs(np.diff(joint_paths(robot, cosines_and_sines(robot, jumps)))).max() <= np.pi + 1e-12
+    assert np.abs(np.diff(joint_paths(robot, cosines_and_sines(robot, jumps), closed=True))).max() <= np.pi + 1e-12
 
 
 @given(robots, seeds)
 def test_joint_paths_end_whole_turns_from_where_they_start(robot: Robot, seed: int) -> None:
-    q = joint_paths(robot, cosines_and_sines(robot, smooth_paths(seed)))
+    q = joint_paths(robot, cosines_and_sines(robot, smooth_paths(seed)), closed=True)
     turns = (q[..., -1] - q[..., 0]) / (2 * np.pi)
     assert q.shape == (4, 6, 41)
     assert turns == pytest.approx(np.round(turns), abs=1e-12)
+
+
+@given(robots, seeds)
+def test_open_path_is_the_closed_one_without_its_way_back(robot: Robot, seed: int) -> None:
+    lanes = cosines_and_sines(robot, smooth_paths(seed))
+    whole, without = (joint_paths(robot, lanes, closed) for closed in (True, False))
+    assert without.shape == (4, 6, 40)
+    assert (without == whole[..., :-1]).all()
 
 
 @given(robots, seeds)
@@ -115,14 +123,14 @@ def test_on_wrist_leaves_noflip_paths_and_flips_the_others() -> None:
     assert (on_wrist(ER16, q, "flip") == flip(ER16, q)).all()
 
 
-@given(robots, seeds, st.sampled_from([("noflip", "flip"), ("flip", "noflip"), ("flip",)]))
+@given(robots, seeds, st.sampled_from([("noflip", "flip"), ("flip", "noflip"), ("flip",)]), st.booleans())
 def test_first_wrist_that_keeps_the_margin_is_chosen_or_else_the_one_that_keeps_most(
-    robot: Robot, seed: int, wrists: tuple[str, ...]
+    robot: Robot, seed: int, wrists: tuple[str, ...], closed: bool
 ) -> None:
     q, need = smooth_paths(seed, m=8) * np.array([0.6, 0.6, 0.6, 1.0, 0.6, 1.0])[:, None], 0.1
     lanes = cosines_and_sines(robot, q)
-    margins, best = best_wrist(Limits.of(robot), lanes, wrists, need)
-    paths = joint_paths(robot, lanes)
+    margins, best = best_wrist(Limits.of(robot, closed), lanes, wrists, need)
+    paths = joint_paths(robot, lanes, closed)
     each = [limit_margins(robot, settle(robot, on_wrist(robot, paths, wrist), need)).min(axis=-1) for wrist in wrists]
     for i in range(8):
         enough = [k for k in range(len(wrists)) if each[k][i] >= need]

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 from nlpweld.cell import load_cell
 from nlpweld.cell.task import Tee
-from nlpweld.geometry.seam import WeldFrames, saddle, seam_parameters, weld_frames
+from nlpweld.geometry.saddle import saddle
+from nlpweld.geometry.seam import seam_parameters, weld_frames
+from nlpweld.geometry.weld_frames import WeldFrames
 
 THETA = np.linspace(0, 2 * np.pi, 361)
 

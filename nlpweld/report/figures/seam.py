@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
+from nlpweld.cell.task import Tee
 from nlpweld.report import style
 from nlpweld.report.figures import Drawing
 from nlpweld.report.study import Study
@@ -29,6 +30,7 @@ def drawings(study: Study) -> list[Drawing]:
 def tee(study: Study) -> Figure:
     """Draw both pipes as wires and the seam on them."""
     part, seam = study.plan("paper").cell.workpiece, study.data("seam")
+    assert isinstance(part, Tee)
     angle, half = np.linspace(0, 2 * np.pi, 33), part.main_length_m / 2
     fig = style.figure(74)
     axes = style.space(fig, elevation=24, azimuth=-52)

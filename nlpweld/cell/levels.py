@@ -1,0 +1,80 @@
+"""What is searched, allowed and asked for: placement box, branches, levels, objective."""
+
+from typing import Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from nlpweld.cell.checked import Finite, NonNegative, Positive, Sourced, Vector
+
+READINGS = ("paper", "equal", "harmonic", "sqrt_tight", "millimetres", "product", "mean")
+Reading = Literal["paper", "equal", "harmonic", "sqrt_tight", "millimetres", "product", "mean"]
+WITHOUT_HANDLERS = ("product", "mean")  # readings that do not tell tight from loose robots
+
+
+class Search(Sourced):
+    """The placement box S: where the placement frame {P} may be in W [m], and how it may be turned about z_W.
+
+    {P} is the workpiece frame's origin, its axes along W's, where robots carry the work; it is where a positioner
+    stands where there is one. A coordinate whose bounds are equal is held.
+    """
+
+    lower_m: Vector
+    upper_m: Vector
+    yaw_deg: tuple[Finite, Finite] = (0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _box_is_ordered(self) -> "Search":
+        bounds = zip("xyz", self.lower_m, self.upper_m, strict=True)
+        for axis, low, high in bounds:
+            if low > high:
+                raise ValueError(f"lower_m.{axis} {low:g} is not below upper_m.{axis} {high:g}; swap them")
+        if self.yaw_deg[0] > self.yaw_deg[1]:
+            raise ValueError(f"yaw_deg {self.yaw_deg[0]:g} is above {self.yaw_deg[1]:g}; swap them")
+        if not (self.bounds[0] < self.bounds[1]).any():
+            raise ValueError("every coordinate is held; leave at least one free, its lower bound below its upper")
+        return self
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Bounds of x, y, z [m] and yaw [rad], shape (2, 4)."""
+        low, high = np.radians(self.yaw_deg)
+        return np.array([[*self.lower_m, low], [*self.upper_m, high]])
+
+
+class Configuration(Sourced):
+    """Which inverse-kinematics branches may be used; ``any`` opens both sides."""
+
+    shoulder: Literal["front", "back", "any"]
+    elbow: Literal["up", "down", "any"]
+    wrist: Literal["flip", "noflip", "any"]
+
+
+class Constraints(Sourced):
+    """Levels that must hold along the whole seam, and the margins solvers keep at its points.
+
+    ``verify_step_m`` is the longest motion of any body end between two configurations the verifier looks at.
+    """
+
+    singularity_floor_m3: NonNegative
+    clearance_m: NonNegative
+    singularity_margin_m3: NonNegative
+    clearance_margin_m: NonNegative
+    joint_margin_deg: NonNegative
+    verify_step_m: Positive
+
+    @property
+    def floor_at_points_m3(self) -> float:
+        """The singularity floor with the margin solvers keep at the seam's points [m^3]."""
+        return self.singularity_floor_m3 + self.singularity_margin_m3
+
+    @property
+    def clearance_at_points_m(self) -> float:
+        """The clearance with the margin solvers keep at the seam's points [m]."""
+        return self.clearance_m + self.clearance_margin_m
+
+
+class Objective(Sourced):
+    """How the robots' manipulabilities make one number: a reading of Pan et al., eq. (16), their product or mean."""
+
+    reading: Reading
