@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from nlpweld.cell.checked import Checked, Name, Vector
 from nlpweld.cell.complaint import nearest
-from nlpweld.cell.levels import WITHOUT_HANDLERS, Configuration, Constraints, Objective, Search
+from nlpweld.cell.levels import WITHOUT_HANDLERS, Configuration, Constraints, Freedom, Objective, Search
 from nlpweld.cell.robot import Body
 from nlpweld.cell.seams import Composite, Polyline
 from nlpweld.cell.station import Station
@@ -34,6 +34,7 @@ class Cell(Checked):
     configuration: Configuration
     constraints: Constraints
     objective: Objective
+    freedom: Freedom | None = None
     placements: Annotated[dict[str, Vector], Field(default_factory=dict)]
 
     @model_validator(mode="after")

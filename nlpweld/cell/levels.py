@@ -78,3 +78,34 @@ class Objective(Sourced):
     """How the robots' manipulabilities make one number: a reading of Pan et al., eq. (16), their product or mean."""
 
     reading: Reading
+
+
+Band = tuple[Finite, Finite]
+
+
+class Freedom(Sourced):
+    """What a weld leaves free along the seam, for the redundant formulations; bands are offsets from the nominal [deg].
+
+    ``spin_deg``: torch about its own axis. ``yaw_deg``: workpiece about the vertical, where robots carry it.
+    ``slope_deg``, ``rotation_deg``: how far the weld may be tilted off its position (ISO 6947). ``travel_deg``,
+    ``work_deg``: tilt of a torch that is held by angles. ``joint_step_deg``: how far any joint may turn from one seam
+    point to the next.
+    """
+
+    spin_deg: Band = (-180.0, 180.0)
+    yaw_deg: Band = (-180.0, 180.0)
+    slope_deg: Band = (-5.0, 5.0)
+    rotation_deg: Band = (-10.0, 10.0)
+    travel_deg: Band = (-5.0, 5.0)
+    work_deg: Band = (-5.0, 5.0)
+    joint_step_deg: Positive
+
+    @model_validator(mode="after")
+    def _bands_hold_the_nominal(self) -> "Freedom":
+        for name in ("spin_deg", "yaw_deg", "slope_deg", "rotation_deg", "travel_deg", "work_deg"):
+            low, high = getattr(self, name)
+            if not low < high:
+                raise ValueError(f"{name} [{low:g}, {high:g}] is empty or reversed; give the lower bound first")
+            if not low <= 0.0 <= high:
+                raise ValueError(f"{name} [{low:g}, {high:g}] leaves out the nominal 0; widen it")
+        return self

@@ -127,11 +127,11 @@ def machine(variables: int, lanes: int = LANES) -> Any:
     return load("\n".join(head) + "\n\n\n" + "\n\n".join(jitted)).run
 
 
-def summed_jet(f: ca.Function, points: np.ndarray) -> Callable[[np.ndarray, float, bool], np.ndarray]:
-    """Return ``(x, sharpness, slopes) -> jet`` of the sum over seam points of ``f(x, point, sharpness)``.
+def lane_jet(f: ca.Function, points: np.ndarray) -> Callable[[np.ndarray, float, bool], np.ndarray]:
+    """Return ``(z, sharpness, slopes) -> jets`` (rows, N) of ``f(z, point, sharpness)`` at every seam point.
 
     A jet is the value, the gradient, and the upper triangle of the Hessian row by row. Without slopes only the value
-    is computed, several times faster, and the rest is zero.
+    is computed, several times faster, and the rest is not to be looked at. z is (d,) or, one for each point, (d, N).
 
     Args:
         f: an SX function of d variables, a seam point's data and a number.
@@ -143,14 +143,28 @@ def summed_jet(f: ca.Function, points: np.ndarray) -> Callable[[np.ndarray, floa
     lanes = np.minimum(np.arange(blocks * LANES), n - 1)  # the last point fills the last block
     inputs[:, d:-1, 0] = points[:, lanes].reshape(len(points), blocks, LANES).transpose(1, 0, 2)
     inputs[:, range(d), range(1, d + 1)] = 1.0
-    flat, counts = inputs.reshape(blocks, d + len(points) + 1, -1), np.arange(blocks * LANES) < n
+    flat = inputs.reshape(blocks, d + len(points) + 1, -1)
     work, total = np.zeros((program.registers + 1) * rows * LANES + 3 * LANES), np.zeros((blocks, rows * LANES))
     passive = np.zeros_like(program.active)
 
-    def jet(x: np.ndarray, sharpness: float, slopes: bool) -> np.ndarray:
-        inputs[:, :d, 0], inputs[:, -1, 0] = np.reshape(x, (1, d, 1)), sharpness
+    def jet(z: np.ndarray, sharpness: float, slopes: bool) -> np.ndarray:
+        z = z[:, lanes] if z.ndim == 2 else np.broadcast_to(z[:, None], (d, blocks * LANES))
+        inputs[:, :d, 0], inputs[:, -1, 0] = z.reshape(d, blocks, LANES).transpose(1, 0, 2), sharpness
         run(program.code, program.active if slopes else passive, program.constants, flat, work, total)
-        lanes = total.reshape(blocks, rows, LANES).transpose(1, 0, 2).reshape(rows, -1)
-        return lanes[:, counts].sum(axis=1)
+        return total.reshape(blocks, rows, LANES).transpose(1, 0, 2).reshape(rows, -1)[:, :n]
+
+    return jet
+
+
+def summed_jet(f: ca.Function, points: np.ndarray) -> Callable[[np.ndarray, float, bool], np.ndarray]:
+    """Return ``(x, sharpness, slopes) -> jet``, the sum over seam points of :func:`lane_jet`; x is (d,)."""
+    lanes = lane_jet(f, points)
+
+    def jet(x: np.ndarray, sharpness: float, slopes: bool) -> np.ndarray:
+        found = lanes(x, sharpness, slopes)
+        total = np.zeros(len(found))
+        known = len(found) if slopes else 1
+        total[:known] = found[:known].sum(axis=1)
+        return total
 
     return jet

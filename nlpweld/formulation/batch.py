@@ -23,6 +23,9 @@ CONSTRAINTS = ("reach", "joint_limit", "singularity", "clearance")
 class Evaluator(Protocol):
     """Judges placements."""
 
+    def at(self, points: np.ndarray) -> "Evaluator":
+        """Return the same over other data of the seam points."""
+
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X, shape (m, d)."""
 
@@ -70,13 +73,9 @@ class Batch:
         return chosen_engine(self.engine)
 
     @cached_property
-    def _evaluator(self) -> Evaluator:
-        given = self.cell, self.stage, self.points, self.arm_branches
-        if self.chosen_engine != "numba":
-            return Staged(*given)
-        from nlpweld.formulation.fused import Fused  # Numba, which the base install lacks
-
-        return Fused(*given)
+    def evaluator(self) -> Evaluator:
+        """What judges placements on the chosen engine."""
+        return evaluator(self.chosen_engine, self.cell, self.stage, self.points, self.arm_branches)
 
     def prepare(self) -> None:
         """Build, compile and run everything once, so that what follows measures evaluation alone."""
@@ -84,4 +83,15 @@ class Batch:
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X (m, d), free coordinates [m; rad]."""
-        return self._evaluator.evaluate(np.atleast_2d(np.asarray(X, dtype=float)))
+        return self.evaluator.evaluate(np.atleast_2d(np.asarray(X, dtype=float)))
+
+
+def evaluator(
+    engine: str, cell: Cell, stage: Stage, points: np.ndarray, arm_branches: list[tuple[str, str]]
+) -> Evaluator:
+    """Return what judges placements on an engine: candidate by candidate on Numba, else in arrays."""
+    if engine != "numba":
+        return Staged(cell, stage, points, arm_branches)
+    from nlpweld.formulation.fused import Fused  # Numba, which the base install lacks
+
+    return Fused(cell, stage, points, arm_branches)

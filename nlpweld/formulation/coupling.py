@@ -11,11 +11,15 @@ import numpy as np
 from nlpweld.cell.cell import Cell
 from nlpweld.cell.station import Station
 from nlpweld.cell.task import Grasp, Torch, TorchAngles
-from nlpweld.formulation.holder import held
+from nlpweld.formulation.freedom import turn, turned_work
+from nlpweld.formulation.holder import held, posture_frames
 from nlpweld.geometry.seam import weld_frames
 from nlpweld.geometry.torch_angles import torch_pose
 from nlpweld.geometry.weld_angles import weld_rotations
 from nlpweld.kinematics.chain import Frame, constant, rpy_pose
+from nlpweld.kinematics.torch import torch_frame
+
+Names = tuple[str, ...]  # of free angles
 
 FACING = np.diag([1.0, -1.0, -1.0, 1.0])  # T_H_E: the torch's TCP looks at the weld, {H} away from it
 
@@ -25,60 +29,94 @@ class WeldPoint:
     """Symbols of one seam point.
 
     Attributes:
-        T_P_C: workpiece in the placement frame {P} while the point is welded.
+        T_P_C: workpiece in the placement frame {P} while the point is welded, turned as its free angles say.
         targets: for each station where its TCP is to be in C; the origin alone counts for a torch with a heading,
             and nothing for a handler.
+        spins: for each station by how much its torch is spun, or None [rad].
         ends_P: ends of the positioner's moving bodies in {P}, side by side, shape (3, 2b) [m].
-        vector: all of them, shape (k, 1).
+        data: what is known of the point, shape (k, 1), in the order of :func:`point_data`.
+        free: its free angles, shape (f, 1) [rad].
     """
 
     T_P_C: Frame
     targets: tuple[Frame | None, ...]
+    spins: tuple[ca.SX | None, ...]
     ends_P: ca.SX
-    vector: ca.SX
+    data: ca.SX
+    free: ca.SX
+
+    @property
+    def vector(self) -> ca.SX:
+        """Data, then free angles, shape (k + f, 1)."""
+        return ca.vertcat(self.data, self.free)
 
 
-def weld_point(cell: Cell) -> WeldPoint:
-    """Return fresh symbols for a seam point, in the order of :func:`point_data`."""
+def weld_point(cell: Cell, free: Names = ()) -> WeldPoint:
+    """Return fresh symbols for a seam point at which some angles are free."""
+    u = ca.SX.sym("free", len(free))
+    angles = dict(zip(free, ca.vertsplit(u), strict=True)) if free else {}
     blocks = [ca.SX.sym("R_P_C", 3, 3)]
     if cell.positioner:
         blocks.append(ca.SX.sym("p_P_C", 3))
-    T_P_C = Frame(blocks[0], blocks[1] if cell.positioner else ca.SX(3, 1))
+    nominal = Frame(blocks[0], blocks[1] if cell.positioner else ca.SX(3, 1))
+    R_P_p = ca.SX.sym("R_P_p", 3, 3) if tilts(free) else None
+    blocks += [] if R_P_p is None else [R_P_p]
     targets: list[Frame | None] = []
     for station in cell.stations:
-        target, symbols = _target(station)
+        target, symbols = _target(station, angles)
         targets.append(target)
         blocks += symbols
     ends_P = ca.SX.sym("ends_P", 3, 2 * len(moving_bodies(cell)))
-    return WeldPoint(T_P_C, tuple(targets), ends_P, ca.vertcat(*[ca.vec(block) for block in [*blocks, ends_P]]))
+    data = ca.vertcat(*[ca.vec(block) for block in [*blocks, ends_P]])
+    spins = tuple(None if s.coupling.kind == "tight" else angles.get(f"spin.{s.name}") for s in cell.stations)
+    return WeldPoint(turned_work(nominal, R_P_p, angles), tuple(targets), spins, ends_P, data, u)
 
 
-def _target(station: Station) -> tuple[Frame | None, list[ca.SX]]:
+def tilts(free: Names) -> bool:
+    """Tell whether the workpiece may be tilted."""
+    return "slope" in free
+
+
+def _target(station: Station, angles: dict[str, ca.SX]) -> tuple[Frame | None, list[ca.SX]]:
+    """Return a station's target in C and the symbols it takes from the point's data."""
     if isinstance(station.coupling, Grasp):
         return None, []
     p = ca.SX.sym(f"p_C_{station.name}", 3)
-    if station.coupling.angles is None:
+    held_at = station.coupling.angles
+    if held_at is None:
         return Frame(ca.SX(3, 3), p), [p]
-    R = ca.SX.sym(f"R_C_E_{station.name}", 3, 3)
-    return Frame(R, p), [R, p]
+    R = ca.SX.sym(f"R_C_{station.name}", 3, 3)
+    if f"travel.{station.name}" not in angles:
+        return Frame(R, p), [R, p]
+    travel, work = (
+        np.radians(nominal) + angles[f"{name}.{station.name}"]
+        for name, nominal in (("travel", held_at.travel_deg), ("work", held_at.work_deg))
+    )
+    T_p_H = torch_frame(travel, work, ca.SX(np.radians(held_at.spin_deg)), held_at.stand_off_m)
+    return Frame(R, p) @ T_p_H @ constant(FACING), [R, p]
 
 
-def point_data(cell: Cell, s: np.ndarray) -> np.ndarray:
-    """Return the numbers behind :class:`WeldPoint` at seam parameters s (N,), shape (k, N)."""
+def point_data(cell: Cell, s: np.ndarray, free: Names = ()) -> np.ndarray:
+    """Return the numbers behind :attr:`WeldPoint.data` at seam parameters s (N,), shape (k, N)."""
     work = held(cell, s)
     rows = [_columns(work.T_P_C[:, :3, :3])]
     if cell.positioner:
         rows.append(work.T_P_C[:, :3, 3])
+    if tilts(free):
+        rows.append(_columns(work.T_P_C[:, :3, :3] @ posture_frames(cell, s)))
     for station in cell.stations:
         if isinstance(station.coupling, Torch):
-            rows += _target_data(cell, station.coupling, s)
+            rows += _target_data(cell, station.coupling, s, f"travel.{station.name}" in free)
     rows.append(work.ends_P[:, moving_bodies(cell)].reshape(len(s), -1))
     return np.concatenate(rows, axis=1).T
 
 
-def _target_data(cell: Cell, torch: Torch, s: np.ndarray) -> list[np.ndarray]:
+def _target_data(cell: Cell, torch: Torch, s: np.ndarray, tilted: bool) -> list[np.ndarray]:
+    frames = weld_frames(cell, s, torch.seam)
     if torch.angles is None:
-        return [weld_frames(cell, s, torch.seam).p_C]
+        return [frames.p_C]
+    if tilted:
+        return [_columns(weld_rotations(frames)), frames.p_C]
     T_C_E = torch_target(cell, torch.seam, torch.angles, s)
     return [_columns(T_C_E[:, :3, :3]), T_C_E[:, :3, 3]]
 
@@ -115,14 +153,21 @@ def placement_frame(cell: Cell, x: ca.SX) -> Frame:
     return Frame(ca.sparsify(ca.vertcat(*rows)), whole[:3])
 
 
-def tcp_pose(coupling: Grasp | Torch, T_W_C: Frame, target: Frame | None) -> Frame:
-    """Return T_W_E, where a coupling wants the tool while the workpiece is at T_W_C and the target in C is welded."""
+def tcp_pose(coupling: Grasp | Torch, T_W_C: Frame, target: Frame | None, spin: ca.SX | None = None) -> Frame:
+    """Return T_W_E, where a coupling wants the tool while the workpiece is at T_W_C and the target in C is welded.
+
+    Args:
+        coupling: of the station.
+        T_W_C: pose of the workpiece.
+        target: see :class:`WeldPoint`.
+        spin: turn of a torch about its own axis [rad]; none by default.
+    """
     if isinstance(coupling, Grasp):
         return T_W_C @ constant(coupling.T_C_E)
     assert target is not None
-    if coupling.heading_deg is not None:
-        return Frame(torch_rotation(coupling.heading_deg), T_W_C.point(target.p))
-    return T_W_C @ target
+    heading = coupling.heading_deg
+    T_W_E = T_W_C @ target if heading is None else Frame(torch_rotation(heading), T_W_C.point(target.p))
+    return T_W_E if spin is None else Frame(T_W_E.R @ turn("z", spin), T_W_E.p)
 
 
 def torch_rotation(heading_deg: float) -> ca.SX:
@@ -135,12 +180,12 @@ def torch_rotation(heading_deg: float) -> ca.SX:
     return constant(pose).R
 
 
-def flange_pose(station: Station, T_W_C: Frame, target: Frame | None) -> Frame:
+def flange_pose(station: Station, T_W_C: Frame, target: Frame | None, spin: ca.SX | None = None) -> Frame:
     """Return T_B_F, the flange pose in the station's base frame that its coupling asks for.
 
     The loop is closed here (Pan et al., eq. 7, 8; Zhang et al., eq. 15).
     """
-    T_W_E = tcp_pose(station.coupling, T_W_C, target)
+    T_W_E = tcp_pose(station.coupling, T_W_C, target, spin)
     T_F_E = constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
     return base_pose(station).inverse() @ T_W_E @ T_F_E.inverse()
 

@@ -1,6 +1,7 @@
 """The exact model on Numba: a cell's kernels and the loops of :mod:`~.candidate`, compiled as one module."""
 
 import inspect
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -72,6 +73,14 @@ class Fused:
     stage: Stage
     points: np.ndarray
     arm_branches: list[tuple[str, str]]
+
+    def at(self, points: np.ndarray) -> "Fused":
+        """Return the same over other data of as many seam points, shape (d, N); what is built is kept."""
+        facts, _, _ = self._facts, self._judge, self._scratch  # built before the copy, which shares them
+        other = copy(self)
+        object.__setattr__(other, "points", points)
+        vars(other)["_facts"] = facts._replace(points=points.ravel())
+        return other
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X, shape (m, d)."""

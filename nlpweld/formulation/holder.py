@@ -48,11 +48,16 @@ def held(cell: Cell, s: np.ndarray) -> Held:
     positioner = cell.positioner
     T_P_B = rpy_pose(positioner.base_position_m, positioner.base_rpy_deg)
     T_T_C = rpy_pose(positioner.mount_position_m, positioner.mount_rpy_deg)
-    upright_C = (weld_rotations(frames) @ turn("x", np.radians(cell.posture.turn_deg)))[:, :, 2]
+    upright_C = posture_frames(cell, s)[:, :, 2]
     up_B, closed = up_in_base(T_P_B[:3, :3]), cell.seam.closed
     q = follow(positioner.robot, upright_C @ T_T_C[:3, :3].T, up_B, closed=closed).q
     T_P_L = T_P_B @ link_poses(positioner.robot, q)
     return Held(T_P_L[:, -1] @ T_T_C, q, _ends(positioner, T_P_L))
+
+
+def posture_frames(cell: Cell, s: np.ndarray) -> np.ndarray:
+    """Return the frames of the main seam whose z axis is brought upright, R_C_p' of Zhang et al., shape (M, 3, 3)."""
+    return weld_rotations(weld_frames(cell, s)) @ turn("x", np.radians(cell.posture.turn_deg))
 
 
 def _ends(positioner: Positioner, T_P_L: np.ndarray) -> np.ndarray:

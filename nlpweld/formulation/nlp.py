@@ -64,6 +64,7 @@ class Nlp:
         relax: ``(mode, whole) -> Relaxation``, with every constraint if whole, else with those likely to matter;
             None where there are no derivatives.
         n_modes: number of discrete choices.
+        sample: ``(seed, count) -> `` start points (count, n); spread over the whole box by default.
         prepare: builds what ``evaluate`` needs, so that its cost can be told apart; None where there is nothing.
     """
 
@@ -77,10 +78,13 @@ class Nlp:
     unpack: Callable[[np.ndarray, int], Any] | None = None
     relax: Callable[[int, bool], Relaxation] | None = None
     n_modes: int = 1
+    sample: Callable[[int, int], np.ndarray] | None = None
     prepare: Callable[[], None] | None = None
 
     def starts(self, seed: int, count: int) -> np.ndarray:
         """Return start points in the box from a scrambled Sobol sequence, shape (count, n)."""
+        if self.sample:
+            return self.sample(seed, count)
         return sobol(self.lower, self.upper, seed, count)
 
 

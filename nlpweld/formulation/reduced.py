@@ -11,6 +11,7 @@ from nlpweld.formulation.holder import held
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, on_wrist, settle
 from nlpweld.formulation.smooth import Gaps, near_gaps, relaxation
+from nlpweld.formulation.stage import Stage
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import WRIST, signs
 from nlpweld.plan import Plan
@@ -88,7 +89,7 @@ class Relaxer:
         X = X[np.isfinite(found.objective) & (found.mode == mode)]
         if len(X) < self.enough:
             return None
-        return near_gaps(self.batch.stage, self.batch.modes[mode], X, self.within_m)
+        return near_gaps(self.batch.stage, self.batch.modes[mode], X, self.batch.points, self.within_m)
 
     @cached_property
     def _scouted(self) -> tuple[np.ndarray, Evaluation]:
@@ -100,9 +101,17 @@ class Relaxer:
 
 @dataclass(frozen=True)
 class Unpacker:
-    """Turns a placement and a mode into joint paths."""
+    """Turns a placement and a mode into joint paths.
+
+    Attributes:
+        batch: the exact model, which knows the modes.
+        stage: graphs to use instead of the exact model's.
+        points: data of the seam points for them, shape (k, N).
+    """
 
     batch: Batch
+    stage: Stage | None = None
+    points: np.ndarray | None = None
 
     def __call__(self, x: np.ndarray, mode: int) -> Plan | OutOfReach:
         """Return the plan of placement x (d,) on a mode's branches, or who cannot reach which point."""
@@ -128,10 +137,12 @@ class Unpacker:
 
     def _solve(self, k: int, x: np.ndarray, branch: tuple[str, str]) -> tuple[np.ndarray, np.ndarray]:
         """Return cosines and sines (12, N) and reach (N,) of station k by the CasADi graph itself."""
-        points = self.batch.points
+        points = self.batch.points if self.points is None else self.points
         n = points.shape[1]
-        out = self.batch.stage.arms[k].map(n)(
-            np.repeat(np.reshape(x, (-1, 1)), n, axis=1), points, np.array([signs((*branch, "noflip"))] * n).T
+        out = (
+            (self.stage or self.batch.stage)
+            .arms[k]
+            .map(n)(np.repeat(np.reshape(x, (-1, 1)), n, axis=1), points, np.array([signs((*branch, "noflip"))] * n).T)
         )
         cos_sin = np.array(out[0]).reshape(6, n, 2).transpose(2, 0, 1).reshape(12, n)
         return cos_sin, np.array(out[3]).ravel()

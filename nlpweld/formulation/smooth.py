@@ -15,6 +15,7 @@ from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs
 from nlpweld.kinematics.manipulability import magnitude, mmr
 
+STEP_WEIGHT = 0.1  # of a joint step too long by itself, against one for a constraint missed by as much as its level
 Branch = tuple[str, str]
 Mode = tuple[Branch, ...]
 
@@ -38,11 +39,19 @@ def all_gaps(stage: Stage) -> Gaps:
     return Gaps(meetings, tuple(tuple(range(height.numel_out(0))) for height in stage.heights))
 
 
-def near_gaps(stage: Stage, mode: Mode, X: np.ndarray, within_m: float) -> Gaps:
-    """Return the distances that fall below a bound somewhere on the seam at any of some placements X (m, d)."""
-    points = point_data(stage.cell, seam_parameters(stage.cell))
-    m, n = len(X), points.shape[1]
-    x, point = np.repeat(X, n, axis=0).T, np.tile(points, m)
+def near_gaps(stage: Stage, mode: Mode, Z: np.ndarray, points: np.ndarray, within_m: float) -> Gaps:
+    """Return the distances that fall below a bound somewhere on the seam at any of some candidates.
+
+    Args:
+        stage: the cell's graphs.
+        mode: (shoulder, elbow) of every station.
+        Z: placements and free angles, the same along the seam, shape (m, d + f) [m; rad].
+        points: the data of every seam point, shape (k, N).
+        within_m: the bound [m].
+    """
+    (m, d), n = (len(Z), len(stage.cell.variables)), points.shape[1]
+    lanes = np.repeat(Z, n, axis=0).T
+    x, point = lanes[:d], np.vstack([np.tile(points, m), lanes[d:]])
     ends = [arm.map(m * n)(x, point, _branch(b, m * n))[4] for arm, b in zip(stage.arms, mode, strict=True)]
     ends.append(stage.work.map(m * n)(x, point))
     meetings = {
@@ -63,7 +72,7 @@ def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, engine: str =
     that keeps it of order one, whatever the reading.
 
     Args:
-        stage: the cell's graphs.
+        stage: the cell's graphs, without free angles.
         mode: (shoulder, elbow) of every station.
         gaps: the distances to look at; all by default.
         engine: ``numba`` differentiates by jets, ``c`` compiles what CasADi differentiates.
@@ -74,9 +83,12 @@ def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, engine: str =
 
 
 def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
-    """Return ``(x, point, sharpness) ->`` what one of n seam points adds to the objective."""
-    cell, arm = stage.cell, stage.arms[0]
-    x, point, sharpness = ca.SX.sym("x", arm.nnz_in(0)), ca.SX.sym("point", arm.nnz_in(1)), ca.SX.sym("sharpness")
+    """Return ``(x, point, sharpness) ->`` what one of n seam points adds to the objective.
+
+    The free angles of the point, if the stage has any, follow the placement's coordinates in x.
+    """
+    cell, sharpness = stage.cell, ca.SX.sym("sharpness")
+    z, data, x, point = _variables(stage)
     arms = [arm(x, point, _branch(b)) for arm, b in zip(stage.arms, mode, strict=True)]
     constraints = [g for k in range(len(arms)) for g in _robot_constraints(cell, k, arms[k])]
     ends = [*(arm[4] for arm in arms), stage.work(x, point)]
@@ -86,7 +98,39 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
     tight, reading = cell.tight, cell.objective.reading
     value = mmr(reading, [a[1] for a in arms], [a[2] for a in arms], tight) / magnitude(reading, tight)
     term = -value / n + ca.sum1(_softplus(-sharpness * ca.vertcat(*constraints))) / sharpness
-    return ca.Function("term", [x, point, sharpness], [term], {"cse": True})
+    return ca.Function("term", [z, data, sharpness], [term], {"cse": True})
+
+
+def step_function(stage: Stage, mode: Mode, bound: float) -> ca.Function:
+    """Return ``(x, points, sharpness) ->`` the penalty on joints that turn too far from one seam point to the next.
+
+    Placement, free angles of the point and of the next one make up x; the data of both points follow each other.
+
+    Args:
+        stage: the cell's graphs, with free angles.
+        mode: (shoulder, elbow) of every station.
+        bound: how far a joint may turn, below half a turn [rad].
+    """
+    z, data, x, point = _variables(stage)
+    u, following, sharpness = (
+        ca.SX.sym("u", len(stage.free)),
+        ca.SX.sym("following", data.shape),
+        ca.SX.sym("sharpness"),
+    )
+    gaps = []
+    for grip, branch in zip(stage.grips, mode, strict=True):
+        here, there = (grip(x, p, _branch(branch))[0] for p in (point, ca.vertcat(following, u)))
+        gaps.append((ca.sum2(here * there) - np.cos(bound)) / (1 - np.cos(bound)))
+    penalty = STEP_WEIGHT * ca.sum1(_softplus(-sharpness * ca.vertcat(*gaps))) / sharpness
+    inputs = [ca.vertcat(z, u), ca.vertcat(data, following), sharpness]
+    return ca.Function("step", inputs, [penalty], {"cse": True})
+
+
+def _variables(stage: Stage) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Return symbols for placement with free angles, and point data, and what the stage's graphs take of them."""
+    d, f = len(stage.cell.variables), len(stage.free)
+    z, data = ca.SX.sym("x", d + f), ca.SX.sym("point", stage.arms[0].nnz_in(1) - f)
+    return z, data, z[:d], ca.vertcat(data, z[d:])
 
 
 def _branch(branch: Branch, n: int = 1) -> ca.DM:

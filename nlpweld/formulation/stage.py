@@ -47,10 +47,15 @@ class Stage:
 
     Owners of bodies are numbered: the stations in their order, then the work, which is the workpiece and the
     positioner that holds it. Ends of an owner's bodies are (3, 2b) [m] in W: start and end of one body beside the
-    other.
+    other. The free angles of a seam point come last in its data.
+
+    Attributes:
+        cell: the cell.
+        free: names of the angles that are free at every seam point; see :mod:`~.freedom`.
     """
 
     cell: Cell
+    free: tuple[str, ...] = ()
 
     @cached_property
     def grips(self) -> tuple[ca.Function, ...]:
@@ -70,7 +75,7 @@ class Stage:
     @cached_property
     def work(self) -> ca.Function:
         """``(x, point) -> ends`` of the workpiece's bodies, then of the positioner's."""
-        x, point = self._x, weld_point(self.cell)
+        x, point = self._x, weld_point(self.cell, self.free)
         T_W_P = placement_frame(self.cell, x)
         T_W_C = T_W_P @ point.T_P_C
         ends = [T_W_C.point(p) for body in self.cell.workpiece.bodies for p in (body.start_m, body.end_m)]
@@ -153,10 +158,10 @@ class Stage:
         return _function("gap", [a, b, numbers], [gap], ["ends_a", "ends_b", "numbers"], ["gap"])
 
     def _grip(self, station: Station) -> ca.Function:
-        x, point, branch = self._x, weld_point(self.cell), ca.SX.sym("branch", 3)
+        x, point, branch = self._x, weld_point(self.cell, self.free), ca.SX.sym("branch", 3)
         T_W_C = placement_frame(self.cell, x) @ point.T_P_C
-        target = point.targets[self.cell.stations.index(station)]
-        found = self._inverse(station).solve(flange_pose(station, T_W_C, target), branch)
+        k = self.cell.stations.index(station)
+        found = self._inverse(station).solve(flange_pose(station, T_W_C, point.targets[k], point.spins[k]), branch)
         outputs = [ca.horzcat(found.cos, found.sin), self._inverse(station).abs_det_jacobian(found), found.reach]
         inputs = [x, point.vector, branch]
         return _function(f"grip_{station.name}", inputs, outputs, ["x", "point", "branch"], ["cos_sin", "w", "reach"])
@@ -170,7 +175,7 @@ class Stage:
         return _function(f"limbs_{station.name}", [cos_sin], outputs, ["cos_sin"], ["gram", "ends"])
 
     def _arm(self, k: int) -> ca.Function:
-        x, point, branch = self._x, weld_point(self.cell).vector, ca.SX.sym("branch", 3)
+        x, point, branch = self._x, weld_point(self.cell, self.free).vector, ca.SX.sym("branch", 3)
         cos_sin, w, reach = self.grips[k](x, point, branch)
         gram, ends = self.limbs[k](cos_sin)
         name, names = f"arm_{self.cell.stations[k].name}", ["cos_sin", "w", "gram", "reach", "ends"]

@@ -1,6 +1,7 @@
 """The exact model over arrays: the stage's graphs lowered to NumPy, joint paths unwrapped, modes chosen."""
 
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -88,6 +89,13 @@ class Staged:
     @cached_property
     def _chunk(self) -> int:
         return self._candidates(CHUNK)
+
+    def at(self, points: np.ndarray) -> "Staged":
+        """Return the same over other data of the seam points, shape (d, N); what is built is kept."""
+        _ = self._grips, self._limbs, self._work, self._meetings, self._joint_limits  # built before they are shared
+        other = copy(self)
+        object.__setattr__(other, "points", points)
+        return other
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X, shape (m, d)."""

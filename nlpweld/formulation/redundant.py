@@ -1,0 +1,191 @@
+"""The redundant form: placement, and the angles a weld leaves free along the seam, as smooth paths; joints by inverse.
+
+The paths of torch spin, workpiece yaw and tilt are cubic B-splines of few control points, so that there are tens of
+variables, not hundreds, and no path jumps. How far any joint turns from one seam point to the next is bounded.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from nlpweld.cell.cell import Cell
+from nlpweld.formulation.batch import CONSTRAINTS, Batch, Evaluator, evaluator
+from nlpweld.formulation.coded import Assembly, Coding, Piece
+from nlpweld.formulation.coupling import point_data
+from nlpweld.formulation.derivatives import by_functions, lanes_of
+from nlpweld.formulation.freedom import free_angles
+from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
+from nlpweld.formulation.reduced import OutOfReach, Unpacker
+from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps, step_function, term_function
+from nlpweld.formulation.splines import basis
+from nlpweld.formulation.stage import Stage
+from nlpweld.geometry.seam import seam_parameters
+from nlpweld.kinematics.ik import signs
+from nlpweld.plan import Plan
+
+CONTROL_POINTS = 24
+STEP_MARGIN_DEG = 0.05  # by which solvers stay under the bound on joint steps
+
+
+def redundant(cell: Cell, engine: str = "auto", level: str = "spin_yaw_tilt", controls: int = CONTROL_POINTS) -> Nlp:
+    """Return the redundant form of a cell.
+
+    Args:
+        cell: the cell; it states bands and the bound on joint steps in its [freedom] table.
+        engine: ``numpy``, ``numba``, ``c`` or ``auto``.
+        level: what is free, a key of :data:`~.freedom.LEVELS`.
+        controls: control points of every path.
+
+    Raises:
+        OptionError: no such level, or the cell states no freedom.
+    """
+    form = Redundant(Batch(cell, engine), level, controls)
+    lower, upper = form.coding.bounds
+    angles = [f"{a.name}[{i}]_rad" for i in range(controls) for a in form.coding.angles]
+    return Nlp(
+        problem=cell.name,
+        formulation=f"redundant_{level}",
+        names=(*cell.variables, *angles),
+        lower=lower,
+        upper=upper,
+        constraints=(*CONSTRAINTS, "joint_step"),
+        evaluate=form.evaluate,
+        unpack=form.unpack,
+        relax=form.relax,
+        n_modes=len(form.batch.modes),
+        sample=form.starts,
+        prepare=form.prepare,
+    )
+
+
+@dataclass(frozen=True)
+class Redundant:
+    """What a redundant form is made of.
+
+    Attributes:
+        batch: the exact model without freedom; it also tells where placements are feasible.
+        level: what is free.
+        controls: control points of every path.
+    """
+
+    batch: Batch
+    level: str
+    controls: int
+
+    @property
+    def cell(self) -> Cell:
+        """The cell."""
+        return self.batch.cell
+
+    @cached_property
+    def coding(self) -> Coding:
+        """How variables become placement and paths."""
+        s = seam_parameters(self.cell)
+        angles = free_angles(self.cell, self.level)
+        return Coding(self.cell.box, angles, basis(s, self.controls, self.cell.seam.closed))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the free angles."""
+        return tuple(angle.name for angle in self.coding.angles)
+
+    @cached_property
+    def stage(self) -> Stage:
+        """The graphs with free angles."""
+        return Stage(self.cell, self.names)
+
+    @cached_property
+    def data(self) -> np.ndarray:
+        """What is known of the seam points, shape (k, N)."""
+        return point_data(self.cell, seam_parameters(self.cell), self.names)
+
+    @cached_property
+    def _evaluator(self) -> Evaluator:
+        points = np.vstack([self.data, np.zeros((len(self.names), self.data.shape[1]))])
+        return evaluator(self.batch.chosen_engine, self.cell, self.stage, points, self.batch.arm_branches)
+
+    @cached_property
+    def _grips(self) -> list[ca.Function]:
+        return [grip.map(self.data.shape[1]) for grip in self.stage.grips]
+
+    @property
+    def bound(self) -> float:
+        """How far a joint may turn between seam points [rad]."""
+        assert self.cell.freedom is not None
+        return float(np.radians(self.cell.freedom.joint_step_deg))
+
+    def prepare(self) -> None:
+        """Build and compile what ``evaluate`` needs."""
+        self.batch.prepare()
+        self.evaluate(self.coding.constant(self.cell.box.mean(axis=0)[None], np.zeros((1, len(self.names)))))
+
+    def points(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the placement's coordinates (d,) and the seam points' data with their angles, (k + f, N)."""
+        x, angles = self.coding.decode(z)
+        return x, np.vstack([self.data, angles])
+
+    def evaluate(self, Z: np.ndarray) -> Evaluation:
+        """Return objective, violations and best mode of candidates Z, shape (m, n)."""
+        found = [self._one(z) for z in np.atleast_2d(np.asarray(Z, dtype=float))]
+        return Evaluation(*(np.concatenate([getattr(e, f) for e in found]) for f in ("objective", "violation", "mode")))
+
+    def _one(self, z: np.ndarray) -> Evaluation:
+        x, points = self.points(z)
+        found = self._evaluator.at(points).evaluate(x[None])
+        longest = self._longest_step(x, points, int(found.mode[0])) if np.isfinite(found.objective[0]) else 0.0
+        missed = max(0.0, longest - self.bound + np.radians(STEP_MARGIN_DEG)) / np.pi
+        return Evaluation(found.objective, np.hstack([found.violation, [[missed]]]), found.mode)
+
+    def _longest_step(self, x: np.ndarray, points: np.ndarray, mode: int) -> float:
+        """Return the farthest any joint turns from one seam point to the next, the way back included [rad]."""
+        n, longest = points.shape[1], 0.0
+        for grip, branch in zip(self._grips, self.batch.modes[mode], strict=True):
+            side = np.reshape(signs((*branch, "noflip")), (3, 1))
+            cos_sin = np.array(grip(np.tile(x[:, None], n), points, np.tile(side, n))[0])
+            phase = cos_sin[:, ::2] + 1j * cos_sin[:, 1::2]
+            turned = np.roll(phase, -1, axis=1) * phase.conj()
+            longest = max(longest, float(np.abs(np.angle(turned[:, : n if self.cell.seam.closed else n - 1])).max()))
+        return longest
+
+    def unpack(self, z: np.ndarray, mode: int) -> Plan | OutOfReach:
+        """Return the plan of a candidate on a mode's branches, or who cannot reach which point."""
+        x, points = self.points(z)
+        plan = Unpacker(self.batch, self.stage, points)(x, mode)
+        if isinstance(plan, OutOfReach):
+            return plan
+        return plan.with_freedom(dict(zip(self.names, self.coding.decode(z)[1], strict=True)))
+
+    def starts(self, seed: int, count: int) -> np.ndarray:
+        """Return starts (count, n): random placements, and random spins and yaws that stay the same along the seam."""
+        (lower, upper), d, angles = self.coding.bounds, self.coding.d, self.coding.angles
+        turning = np.array([True] * d + [angle.name.partition(".")[0] in ("spin", "yaw") for angle in angles])
+        drawn = np.zeros((count, len(turning)))
+        drawn[:, turning] = sobol(lower[: len(turning)][turning], upper[: len(turning)][turning], seed, count)
+        return self.coding.constant(drawn[:, :d], drawn[:, d:])
+
+    def relax(self, mode: int, whole: bool = False) -> Relaxation:
+        """Return the relaxation on a mode's branches, with every distance if whole."""
+        branches, engine, B = self.batch.modes[mode], self.batch.chosen_engine, self.coding.basis
+        gaps = all_gaps(self.stage) if whole else self._near(mode)
+        term = term_function(self.stage, branches, gaps, self.data.shape[1])
+        step = step_function(self.stage, branches, self.bound - np.radians(STEP_MARGIN_DEG))
+        ahead = np.roll(np.arange(len(B)), -1)
+        here = slice(None) if self.cell.seam.closed else slice(-1)
+        pair = np.vstack([self.data, self.data[:, ahead]])[:, here]
+        pieces = [
+            Piece(lanes_of(term, self.data, engine), (B,)),
+            Piece(lanes_of(step, pair, engine), (B[here], B[ahead][here])),
+        ]
+        whole_sum = Assembly(self.coding, pieces)
+        return by_functions(whole_sum.value, whole_sum.slopes, len(self.coding.bounds[0]))
+
+    def _near(self, mode: int, scouts: int = 64, within_m: float = 0.3) -> Gaps:
+        """Return the distances that matter at some placements and angles within reach."""
+        Z = self.starts(1, 8 * scouts)
+        found = self.evaluate(Z)
+        order = np.lexsort((-found.objective, found.total))[:scouts]
+        d = self.coding.d
+        local = Z[order][:, : d + len(self.names)]
+        return near_gaps(self.stage, self.batch.modes[mode], local, self.data, within_m)
