@@ -106,7 +106,8 @@ def ipopt_path(records: list[dict[str, Any]], optimum: np.ndarray) -> pd.DataFra
 
     Columns: seed, iteration, x_m, y_m, z_m; empty without a verified run.
     """
-    paths = [(r["seed"], np.array([step["x"] for step in r["trace"]])) for r in records if r["verified"] and r["trace"]]
+    good = [r for r in records if r["verified"] and r["trace"]]
+    paths = [(r["seed"], np.array([[step["placement"][a] for a in AXES] for step in r["trace"]])) for r in good]
     far = [p for p in paths if np.linalg.norm(p[1][0] - optimum) > FAR_M] or paths
     if not far:
         return pd.DataFrame(columns=["seed", "iteration", *AXES])

@@ -1,8 +1,9 @@
-"""A plan: where the workpiece goes and how every joint moves along the seam; saved as plain JSON."""
+"""A plan: where the work is placed and how every joint moves along the seam; saved as plain JSON."""
 
 import json
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -12,24 +13,30 @@ from pydantic import ValidationError
 
 from nlpweld.cell.cell import Cell
 from nlpweld.cell.complaint import first_complaint, nearest
+from nlpweld.cell.task import Torch
 from nlpweld.errors import OutputError, PlanError
 
 FORMAT = "nlpweld-plan"
 VERSION = 1
+TILTS = ("slope", "rotation")
 BRANCHES = tuple(product(("front", "back"), ("up", "down"), ("noflip", "flip")))
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Joint paths of every robot along the seam, for one placement of the workpiece.
+    """Joint paths of every robot and of the positioner along the seam, for one placement of the frame {P}.
 
     Attributes:
         cell: the cell the plan belongs to, whole, so that a plan file can be checked on its own.
-        placement_m: origin of C in W, shape (3,) [m].
-        s: seam parameter of each point, shape (N,).
-        paths: station name to joint angles in DH direction, shape (N, n) [rad], continuous along the seam;
-            a closed seam continues from the last point to the first, a multiple of 2 pi away.
+        placement_m: origin of {P} in W, shape (3,) [m]: of C where robots carry the workpiece, else of what the
+            positioner stands on.
+        s: seam parameter of each point, shape (N,): in [0, 1) along a closed seam, in [0, 1] along an open one.
+        paths: name of station or positioner to joint angles in DH direction, shape (N, n) [rad], continuous along the
+            seam; a closed seam continues from the last point to the first, a multiple of 2 pi away.
         branches: station name to (shoulder, elbow, wrist) of the inverse kinematics, or None where unknown.
+        yaw_rad: turn of {P} about z_W [rad].
+        freedom: name of a free angle (:func:`free_names`) to its offset from the nominal at the points, shape (N,)
+            [rad], linear in s between them; None where the plan takes no freedom, and an angle not named stays nominal.
     """
 
     cell: Cell
@@ -37,6 +44,17 @@ class Plan:
     s: np.ndarray
     paths: dict[str, np.ndarray]
     branches: dict[str, tuple[str, str, str]] | None = None
+    yaw_rad: float = 0.0
+    freedom: dict[str, np.ndarray] | None = None
+
+    @property
+    def placement(self) -> np.ndarray:
+        """Placement of {P}: x, y, z [m] and yaw [rad], shape (4,)."""
+        return np.array([*self.placement_m, self.yaw_rad], dtype=float)
+
+    def with_freedom(self, freedom: Mapping[str, np.ndarray] | None) -> "Plan":
+        """Return a copy with these offsets of free angles, each of shape (N,) [rad], or with none."""
+        return replace(self, freedom=None if freedom is None else dict(freedom))
 
     def to_json(self) -> dict[str, Any]:
         """Return the plan as plain data."""
@@ -44,8 +62,10 @@ class Plan:
             "format": FORMAT,
             "version": VERSION,
             "placement_m": self.placement_m.tolist(),
+            "yaw_rad": float(self.yaw_rad),
             "s": self.s.tolist(),
             "paths_rad": {name: q.tolist() for name, q in self.paths.items()},
+            "freedom_rad": None if self.freedom is None else {name: u.tolist() for name, u in self.freedom.items()},
             "branches": self.branches and {name: list(branch) for name, branch in self.branches.items()},
             "cell": self.cell.model_dump(mode="json", exclude_unset=True),
         }
@@ -85,39 +105,104 @@ def load_plan(path: str | Path) -> Plan:
         raise PlanError(f"{path}: {error}; the file was edited, solve again") from None
 
 
+def joint_counts(cell: Cell) -> dict[str, int]:
+    """Return the number of joints of everything a plan moves, by name: the stations in order, then the positioner."""
+    counts = {station.name: len(station.robot.joints) for station in cell.stations}
+    return counts | ({cell.positioner.name: len(cell.positioner.robot.joints)} if cell.positioner else {})
+
+
+def wrong_points(cell: Cell, s: np.ndarray) -> str | None:
+    """Return what numbers that cannot be points along the cell's seam are not, or None where they can be."""
+    closed = cell.seam.closed
+    fewest = 3 if closed else 2
+    increasing = np.ndim(s) == 1 and len(s) >= fewest and bool((np.diff(s) > 0).all())
+    if increasing and s[0] >= 0 and (s[-1] < 1 if closed else s[-1] <= 1):
+        return None
+    return f"not at least {'three' if closed else 'two'} increasing numbers in [0, 1{')' if closed else ']'}"
+
+
+def free_names(cell: Cell) -> tuple[str, ...]:
+    """Return the names of the angles a plan of the cell may turn off their nominal values, whatever their bands.
+
+    ``yaw``, ``slope`` and ``rotation`` of the workpiece where robots carry it; ``spin.<station>`` of every torch, and
+    ``travel.<station>`` and ``work.<station>`` of one that is held by angles.
+    """
+    names = [] if cell.positioner else ["yaw", *TILTS]
+    for station in cell.stations:
+        if isinstance(station.coupling, Torch):
+            kinds = ("spin",) if station.coupling.angles is None else ("spin", "travel", "work")
+            names += [f"{kind}.{station.name}" for kind in kinds]
+    return tuple(names)
+
+
+def wrong_freedom(cell: Cell, freedom: Mapping[str, Any]) -> str | None:
+    """Return what is wrong with the names of free angles, after the name of their table, or None."""
+    known = free_names(cell)
+    for name in freedom:
+        if name not in known:
+            return f".{name}: the cell has no free angle of that name; {nearest(name, known)}"
+    lone = [name for name in TILTS if name in freedom]
+    if len(lone) == 1:
+        return f".{lone[0]}: alone; slope and rotation go together"
+    return None
+
+
 def _plan_from(data: dict[str, Any]) -> Plan:
     cell = Cell.model_validate(data["cell"])
     s, placement = _finite(data["s"], "s"), _finite(data["placement_m"], "placement_m")
+    yaw = _finite(data.get("yaw_rad", 0.0), "yaw_rad")
     if placement.shape != (3,):
         raise ValueError("placement_m: not three numbers")
-    if s.ndim != 1 or len(s) < 3 or (np.diff(s) <= 0).any() or s[0] < 0 or s[-1] >= 1:
-        raise ValueError("s: not at least three increasing numbers in [0, 1)")
-    given, paths = _by_station(data["paths_rad"], cell, "paths_rad"), {}
-    for st in cell.stations:
-        where = f"paths_rad.{st.name}"
-        if st.name not in given:
+    if yaw.shape != ():
+        raise ValueError("yaw_rad: not a number")
+    complaint = wrong_points(cell, s)
+    if complaint:
+        raise ValueError(f"s: {complaint}")
+    paths, branches = _paths(data["paths_rad"], cell, len(s)), data.get("branches")
+    plan = Plan(cell, placement, s, paths, None if branches is None else _branches(branches, cell), float(yaw))
+    freedom = data.get("freedom_rad")
+    return plan if freedom is None else plan.with_freedom(_freedom(freedom, cell, len(s)))
+
+
+def _paths(value: Any, cell: Cell, points: int) -> dict[str, np.ndarray]:
+    counts, paths = joint_counts(cell), {}
+    given = _by_name(value, list(counts), "paths_rad")
+    for name, joints in counts.items():
+        where = f"paths_rad.{name}"
+        if name not in given:
             raise KeyError(where)
-        paths[st.name] = _finite(given[st.name], where)
-        if paths[st.name].shape != (len(s), len(st.robot.joints)):
-            raise ValueError(f"{where}: not one row of {len(st.robot.joints)} joints for each of {len(s)} points")
-    branches = data.get("branches")
-    return Plan(cell, placement, s, paths, None if branches is None else _branches(branches, cell))
+        paths[name] = _finite(given[name], where)
+        if paths[name].shape != (points, joints):
+            raise ValueError(f"{where}: not one row of {joints} joints for each of {points} points")
+    return paths
 
 
 def _branches(value: Any, cell: Cell) -> dict[str, tuple[str, str, str]]:
     branches = {}
-    for name, branch in _by_station(value, cell, "branches").items():
+    for name, branch in _by_name(value, [station.name for station in cell.stations], "branches").items():
         if not isinstance(branch, list) or tuple(branch) not in BRANCHES:
             raise ValueError(f"branches.{name}: not one of {', '.join('-'.join(b) for b in BRANCHES)}")
         branches[name] = (branch[0], branch[1], branch[2])
     return branches
 
 
-def _by_station(value: Any, cell: Cell, where: str) -> dict[str, Any]:
-    """Return a table with one entry per robot, checked to name none that the cell does not have."""
+def _freedom(value: Any, cell: Cell, points: int) -> dict[str, np.ndarray]:
+    if not isinstance(value, dict):
+        raise ValueError("freedom_rad: not a table by angle")
+    complaint = wrong_freedom(cell, value)
+    if complaint:
+        raise ValueError(f"freedom_rad{complaint}")
+    freedom = {name: _finite(offsets, f"freedom_rad.{name}") for name, offsets in value.items()}
+    for name, offsets in freedom.items():
+        if offsets.shape != (points,):
+            raise ValueError(f"freedom_rad.{name}: not one number for each of {points} points")
+    return freedom
+
+
+def _by_name(value: Any, names: list[str], where: str) -> dict[str, Any]:
+    """Return a table with one entry per robot, checked to name none but the given."""
     if not isinstance(value, dict):
         raise ValueError(f"{where}: not a table by robot")
-    names = [st.name for st in cell.stations]
     for name in value:
         if name not in names:
             raise ValueError(f"{where}.{name}: the cell has no robot of that name; {nearest(name, names)}")

@@ -1,5 +1,6 @@
 """Plan files: bit-exact round trips, and one line for each way to spoil one."""
 
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -12,17 +13,21 @@ from hypothesis import strategies as st
 
 from nlpweld.cell import Cell, load_cell
 from nlpweld.errors import OutputError, PlanError
-from nlpweld.plan import Plan, load_plan, write_text
+from nlpweld.plan import Plan, joint_counts, load_plan, write_text
 
 CELL = load_cell("three_er16")
+DUAL = load_cell("dual_welder_positioner")  # open seam
+SINGLE = load_cell("robot_positioner")
 
 
 def random_plan(cell: Cell, seed: int, points: int = 7) -> Plan:
     """Return a plan of random numbers, of every magnitude a double has."""
     rng = np.random.default_rng(seed)
-    paths = {s.name: rng.normal(size=(points, 6)) * 10.0 ** rng.integers(-300, 300, (points, 6)) for s in cell.stations}
+    shapes = {name: (points, joints) for name, joints in joint_counts(cell).items()}
+    paths = {name: rng.normal(size=shape) * 10.0 ** rng.integers(-300, 300, shape) for name, shape in shapes.items()}
     branches = {s.name: ("front", "up", "flip") for s in cell.stations}
-    return Plan(cell, rng.normal(size=3), np.sort(rng.random(points)), paths, branches)
+    s, yaw = np.sort(rng.random(points)), rng.normal()
+    return Plan(cell, rng.normal(size=3), s, paths, branches, yaw_rad=yaw)
 
 
 @pytest.fixture
@@ -32,12 +37,33 @@ def saved(tmp_path: Path) -> Path:
 
 @given(st.integers(0, 10_000))
 def test_saved_plan_comes_back_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
-    plan = random_plan(CELL, seed)
+    plan = random_plan((CELL, DUAL, SINGLE)[seed % 3], seed)
     back = load_plan(plan.save(tmp_path_factory.getbasetemp() / "plan.json"))
     assert back.placement_m.tobytes() == plan.placement_m.tobytes()
     assert back.s.tobytes() == plan.s.tobytes()
     assert {name: q.tobytes() for name, q in back.paths.items()} == {n: q.tobytes() for n, q in plan.paths.items()}
     assert back.branches == plan.branches
+    assert back.yaw_rad == plan.yaw_rad
+    assert back.placement.tolist() == [*plan.placement_m, plan.yaw_rad]
+
+
+def test_joints_are_those_of_the_robots_and_of_the_positioner() -> None:
+    assert joint_counts(CELL) == {"handler_1": 6, "handler_2": 6, "welder": 6}
+    assert joint_counts(DUAL) == {"robot_1": 6, "robot_2": 6, "positioner": 2}
+
+
+def test_plan_without_yaw_has_none(saved: Path) -> None:
+    """Plans from before there was a yaw are of the same version."""
+    data = json.loads(saved.read_text())
+    assert data.pop("yaw_rad") != 0
+    saved.write_text(json.dumps(data))
+    assert load_plan(saved).yaw_rad == 0.0
+    assert load_plan(saved).placement[3] == 0.0
+
+
+def test_open_seam_has_points_at_both_ends(tmp_path: Path) -> None:
+    plan = dataclasses.replace(random_plan(DUAL, seed=6, points=2), s=np.array([0.0, 1.0]))
+    assert load_plan(plan.save(tmp_path / "plan.json")).s.tolist() == [0.0, 1.0]
 
 
 def test_cell_comes_back_equal_and_under_the_same_hash(saved: Path) -> None:
@@ -124,6 +150,16 @@ CHANGES = {  # change of the plan's data, and what the message names
     "cell_of_two_of_one_name": (put("welder", "cell", "stations", 0, "name"), "cell: stations: two are named"),
     "number_too_large": (put(10**400, "placement_m", 1), "placement_m: not an array of numbers"),
     "number_for_cell": (put(5, "cell"), "cell: "),
+    "infinite_yaw": (put(float("inf"), "yaw_rad"), "yaw_rad: holds NaN or infinity"),
+    "yaw_list": (put([0.0], "yaw_rad"), "yaw_rad: not a number"),
+}
+POSITIONER_CHANGES = {
+    "no_path": (removed("paths_rad", "positioner"), "paths_rad.positioner: missing"),
+    "one_joint": (put([[0.0]] * 7, "paths_rad", "positioner"), "paths_rad.positioner: not one row of 2 joints"),
+    "branch": (put(["front", "up", "flip"], "branches", "positioner"), "branches.positioner: "),
+    "other_name": (put([[0.0, 0.0]] * 7, "paths_rad", "table"), "paths_rad.table: "),
+    "s_beyond_one": (put(1.001, "s", -1), "s: not at least two increasing numbers in [0, 1]"),
+    "one_point": (put([0.1], "s"), "s: not at least two increasing numbers in [0, 1]"),
 }
 
 
@@ -145,6 +181,15 @@ def test_spoiled_plan_is_told_in_one_line_with_file_and_field(
     change(data)
     saved.write_text(json.dumps(data))
     assert complaint(saved).startswith(words)
+
+
+@pytest.mark.parametrize(("change", "words"), POSITIONER_CHANGES.values(), ids=POSITIONER_CHANGES)
+def test_spoiled_plan_with_a_positioner_is_told(tmp_path: Path, change: Callable[[Any], None], words: str) -> None:
+    path = random_plan(DUAL, seed=7).save(tmp_path / "plan.json")
+    data = json.loads(path.read_text())
+    change(data)
+    path.write_text(json.dumps(data))
+    assert complaint(path).startswith(words)
 
 
 @pytest.mark.parametrize("text", ["", "plan", "{", "[1, 2", '"', "\ud83d", "[" * 100_000], ids=lambda t: repr(t[:7]))

@@ -54,11 +54,11 @@ def free_angles(cell: Cell, level: str) -> tuple[FreeAngle, ...]:
 
 def _angles(cell: Cell, freedom: Freedom, name: str) -> list[FreeAngle]:
     lower, upper = np.radians(getattr(freedom, f"{name}_deg"))
-    torches = [s for s in cell.stations if isinstance(s.coupling, Torch)]
+    torches = [(s.name, s.coupling) for s in cell.stations if isinstance(s.coupling, Torch)]
     if name == "spin":
-        return [FreeAngle(f"spin.{s.name}", lower, upper) for s in torches]
+        return [FreeAngle(f"spin.{robot}", lower, upper) for robot, _ in torches]
     if name in ("travel", "work"):
-        return [FreeAngle(f"{name}.{s.name}", lower, upper) for s in torches if s.coupling.angles is not None]
+        return [FreeAngle(f"{name}.{robot}", lower, upper) for robot, torch in torches if torch.angles is not None]
     return [] if cell.positioner else [FreeAngle(name, lower, upper)]
 
 

@@ -34,6 +34,22 @@ class Evaluation:
 
 
 @dataclass(frozen=True, eq=False)
+class Equalities:
+    """Constraints ``value(x) == 0`` of a relaxation, with sparse derivatives.
+
+    Attributes:
+        value: ``x -> (m, 1)``.
+        jacobian: ``x -> (m, n)``.
+        hessian: ``(x, sharpness, lam_f, lam_g) -> (n, n)``, the upper triangle of the Hessian of the Lagrangian:
+            ``lam_f`` times the relaxation's value plus ``lam_g`` (m, 1) times these.
+    """
+
+    value: ca.Function
+    jacobian: ca.Function
+    hessian: ca.Function
+
+
+@dataclass(frozen=True, eq=False)
 class Relaxation:
     """A smooth penalised problem: minimise ``value(x, sharpness)`` over the box.
 
@@ -41,11 +57,13 @@ class Relaxation:
         value: ``(x, sharpness) -> scalar``; soft penalties that tend to the exact constraints as sharpness grows.
         gradient: ``(x, sharpness) -> (1, n)`` or (n, 1).
         hessian: ``(x, sharpness) -> (n, n)``.
+        equalities: constraints that hold besides, or None where the box is all there is.
     """
 
     value: ca.Function
     gradient: ca.Function
     hessian: ca.Function
+    equalities: Equalities | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +82,8 @@ class Nlp:
         relax: ``(mode, whole) -> Relaxation``, with every constraint if whole, else with those likely to matter;
             None where there are no derivatives.
         n_modes: number of discrete choices.
+        widened: the same problem with margins grown by amounts for ``singularity`` [m^3], ``clearance`` [m] and
+            ``joint_limit`` [rad]; None where there are none.
         sample: ``(seed, count) -> `` start points (count, n); spread over the whole box by default.
         prepare: builds what ``evaluate`` needs, so that its cost can be told apart; None where there is nothing.
     """
@@ -78,6 +98,7 @@ class Nlp:
     unpack: Callable[[np.ndarray, int], Any] | None = None
     relax: Callable[[int, bool], Relaxation] | None = None
     n_modes: int = 1
+    widened: Callable[[dict[str, float]], "Nlp"] | None = None
     sample: Callable[[int, int], np.ndarray] | None = None
     prepare: Callable[[], None] | None = None
 

@@ -8,6 +8,7 @@ import numpy as np
 from nlpweld.cell.cell import Cell
 from nlpweld.formulation.batch import CONSTRAINTS, Batch
 from nlpweld.formulation.holder import held
+from nlpweld.formulation.margins import with_margins
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, on_wrist, settle
 from nlpweld.formulation.smooth import Gaps, near_gaps, relaxation
@@ -54,6 +55,7 @@ def reduced(cell: Cell, engine: str = "auto") -> Nlp:
         unpack=Unpacker(batch),
         relax=Relaxer(batch),
         n_modes=len(batch.modes),
+        widened=lambda extra: reduced(with_margins(cell, extra), engine),
         prepare=batch.prepare,
     )
 

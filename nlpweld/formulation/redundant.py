@@ -16,6 +16,7 @@ from nlpweld.formulation.coded import Assembly, Coding, Piece
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.derivatives import by_functions, lanes_of
 from nlpweld.formulation.freedom import free_angles
+from nlpweld.formulation.margins import with_margins
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.reduced import OutOfReach, Unpacker
 from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps, step_function, term_function
@@ -25,6 +26,7 @@ from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs
 from nlpweld.plan import Plan
 
+REDUNDANT = {"spin": "redundant_spin", "spin_yaw": "redundant_spin_yaw", "spin_yaw_tilt": "redundant"}
 CONTROL_POINTS = 24
 STEP_MARGIN_DEG = 0.05  # by which solvers stay under the bound on joint steps
 
@@ -46,7 +48,7 @@ def redundant(cell: Cell, engine: str = "auto", level: str = "spin_yaw_tilt", co
     angles = [f"{a.name}[{i}]_rad" for i in range(controls) for a in form.coding.angles]
     return Nlp(
         problem=cell.name,
-        formulation=f"redundant_{level}",
+        formulation=REDUNDANT[level],
         names=(*cell.variables, *angles),
         lower=lower,
         upper=upper,
@@ -55,6 +57,7 @@ def redundant(cell: Cell, engine: str = "auto", level: str = "spin_yaw_tilt", co
         unpack=form.unpack,
         relax=form.relax,
         n_modes=len(form.batch.modes),
+        widened=lambda extra: redundant(with_margins(cell, extra), engine, level, controls),
         sample=form.starts,
         prepare=form.prepare,
     )

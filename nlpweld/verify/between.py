@@ -5,7 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from nlpweld.cell import Cell, Station
+from nlpweld.geometry.seam import breaks
 from nlpweld.verify import reference as ref
+from nlpweld.verify.freedom import Offsets
+from nlpweld.verify.upright import posture_limit, turn_upright
 
 JOINT_STEP_RAD = np.radians(3.0)
 DEPTH = 10  # halvings; a path that still moves far over 1/1024 of an interval jumps
@@ -13,6 +16,7 @@ SAMPLES = 20_000
 CLOSED = 1e-8  # [m] and [rad]; Newton ends near 1e-12 where it ends at all
 ITERATIONS = 30
 LONGEST_STEP_RAD = 0.3
+SAME_S = 1e-9
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,10 @@ class Jump:
 
 @dataclass(frozen=True)
 class Unclosed:
-    """A place between two points where no configuration near them reaches the pose the weld asks for."""
+    """A place between two points where no configuration near them reaches the pose the weld asks for.
+
+    Of the positioner, ``rotation_rad`` is how far from upright it leaves the weld.
+    """
 
     robot: str
     s: float
@@ -42,15 +49,16 @@ class Unclosed:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Configurations along the whole closed seam, in order; the last continues to the first point, one turn on.
+    """Configurations along the whole seam, in order; a closed one's last continues to the first point, one turn on.
 
     Attributes:
-        s: seam parameter, shape (K,), from s_0 to s_0 + 1.
-        q: joint angles by station name, each of shape (K, n) [rad].
+        s: seam parameter, shape (K,), from s_0 to s_0 + 1, or to the last point of an open seam.
+        q: joint angles by name of station or positioner, each of shape (K, n) [rad].
         at: index of each point of the plan among the samples, shape (N,).
         point: index of the point at or before each sample, shape (K,).
         jumps: where the path is torn.
         unclosed: where the chain does not close.
+        free: offsets of free angles along it, if any.
     """
 
     s: np.ndarray
@@ -59,42 +67,88 @@ class Motion:
     point: np.ndarray
     jumps: list[Jump] = field(default_factory=list)
     unclosed: list[Unclosed] = field(default_factory=list)
+    free: Offsets | None = None
 
 
-def whole_motion(cell: Cell, c: np.ndarray, s: np.ndarray, paths: dict[str, np.ndarray]) -> Motion:
+def whole_motion(
+    cell: Cell,
+    placement: np.ndarray,
+    s: np.ndarray,
+    paths: dict[str, np.ndarray],
+    free: Offsets | None = None,
+) -> Motion:
     """Return the motion of a plan, with enough samples between its points.
 
     Between two neighbouring samples no body end moves more than the cell's ``verify_step_m`` and no joint more than
-    ``JOINT_STEP_RAD``, except at the jumps it lists.
+    ``JOINT_STEP_RAD``, except at the jumps it lists. Where pieces of the seam join there is a sample.
 
     Args:
         cell: the cell.
-        c: origin of C in W, shape (3,) [m].
-        s: seam parameter of the points, shape (N,), increasing in [0, 1).
-        paths: joint angles by station name, each of shape (N, n) [rad].
+        placement: of {P} in W, shape (3,) or (4,) [m; rad].
+        s: seam parameter of the points, shape (N,), increasing in [0, 1), or in [0, 1] where the seam is open.
+        paths: joint angles by name of station or positioner, each of shape (N, n) [rad].
+        free: offsets of free angles, if any.
     """
-    S = np.append(s, s[0] + 1)
-    q = {name: np.vstack([path, _one_turn_on(path)]) for name, path in paths.items()}
-    ends = _ends(cell, c, S, q)
-    torn = np.zeros(len(s), dtype=bool)  # intervals that cannot be halved
-    unclosed: list[Unclosed] = []
+    samples = _Samples(cell, placement, s, paths, free)
+    samples.insert(*_joints_of_pieces(cell, samples.s))
     for _ in range(DEPTH):
-        split = np.flatnonzero(_too_long(cell, q, ends) & ~torn)
-        if len(split) == 0 or len(S) + len(split) > max(SAMPLES, 4 * len(s)):
+        split = np.flatnonzero(samples.too_long() & ~samples.torn)
+        if len(split) == 0 or len(samples.s) + len(split) > max(SAMPLES, 4 * len(s)):
             break
-        middle, q_middle, bad = _halve(cell, c, S, q, split)
-        unclosed += bad
-        good = ~np.isin(middle, [u.s for u in bad])
-        torn[split[~good]] = True
-        where = split[good] + 1
-        q_middle = {name: x[good] for name, x in q_middle.items()}
-        new_ends = _ends(cell, c, middle[good], q_middle)
-        S, torn = np.insert(S, where, middle[good]), np.insert(torn, where, False)
-        q = {name: np.insert(x, where, q_middle[name], axis=0) for name, x in q.items()}
-        ends = {name: np.insert(x, where, new_ends[name], axis=0) for name, x in ends.items()}
+        samples.insert(split, (samples.s[split] + samples.s[split + 1]) / 2, np.full(len(split), 0.5))
+    S = samples.s
     at = np.searchsorted(S, s)
     point = np.minimum(np.searchsorted(s, S, side="right") - 1, len(s) - 1)
-    return Motion(S, q, at, point, _jumps(cell, S, q, ends), unclosed)
+    return Motion(S, samples.q, at, point, samples.jumps(), samples.unclosed, free)
+
+
+class _Samples:
+    """Samples of a motion, to be made denser; ``torn`` marks the intervals that nothing could be put into."""
+
+    def __init__(
+        self, cell: Cell, placement: np.ndarray, s: np.ndarray, paths: dict[str, np.ndarray], free: Offsets | None
+    ) -> None:
+        self.cell, self.placement, self.free = cell, placement, free
+        self.s, self.q = s, dict(paths)
+        if cell.seam.closed:
+            self.s = np.append(s, s[0] + 1)
+            self.q = {name: np.vstack([path, _one_turn_on(path)]) for name, path in paths.items()}
+        self.ends = _ends(cell, placement, self.s, self.q, free)
+        self.torn = np.zeros(len(self.s) - 1, dtype=bool)
+        self.unclosed: list[Unclosed] = []
+
+    def insert(self, after: np.ndarray, s: np.ndarray, share: np.ndarray) -> None:
+        """Put new samples after some, in order, each found from the configuration a share of the way to the next."""
+        start = {name: (1 - x) * q[after] + x * q[after + 1] for name, q in self.q.items() for x in [share[:, None]]}
+        q, bad = _closed(self.cell, self.placement, s, start, self.free)
+        good = ~np.isin(s, [u.s for u in bad])
+        self.unclosed += bad
+        self.torn[after[~good]] = True
+        where, s, q = after[good] + 1, s[good], {name: x[good] for name, x in q.items()}
+        ends = _ends(self.cell, self.placement, s, q, self.free)
+        self.s, self.torn = np.insert(self.s, where, s), np.insert(self.torn, where, False)
+        self.q = {name: np.insert(x, where, q[name], axis=0) for name, x in self.q.items()}
+        self.ends = {name: np.insert(x, where, ends[name], axis=0) for name, x in self.ends.items()}
+
+    def too_long(self) -> np.ndarray:
+        """Tell which intervals are to be halved, shape (K - 1,)."""
+        far = [_steps_m(x) > self.cell.constraints.verify_step_m for x in self.ends.values()]
+        turned = (np.abs(np.diff(x, axis=0)).max(axis=1) > JOINT_STEP_RAD for x in self.q.values())
+        return np.any([*far, *turned], axis=0)
+
+    def jumps(self) -> list[Jump]:
+        """Return what is still too long, in the order of the seam."""
+        jumps = []
+        limit_m = self.cell.constraints.verify_step_m
+        for name, path in self.q.items():
+            turn, way = np.abs(np.diff(path, axis=0)), _steps_m(self.ends[name])
+            for i in np.flatnonzero((turn.max(axis=1) > JOINT_STEP_RAD) | (way > limit_m)):
+                joint = int(turn[i].argmax())
+                step, limit, unit = float(turn[i, joint]), float(JOINT_STEP_RAD), "rad"
+                if step <= limit:
+                    step, limit, unit = float(way[i]), limit_m, "m"
+                jumps.append(Jump(name, joint, float(self.s[i]), step, limit, unit))
+        return jumps
 
 
 def close_chain(station: Station, T_W_E: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -133,20 +187,36 @@ def _newton_step(J: np.ndarray, e: np.ndarray) -> np.ndarray:
     return step * np.minimum(1.0, LONGEST_STEP_RAD / np.maximum(size, 1e-300))
 
 
-def _halve(
-    cell: Cell, c: np.ndarray, s: np.ndarray, q: dict[str, np.ndarray], split: np.ndarray
-) -> tuple[np.ndarray, dict[str, np.ndarray], list[Unclosed]]:
-    """Return the middles of some intervals, the configurations there, and the middles where a chain stays open."""
-    middle = (s[split] + s[split + 1]) / 2
-    found, bad = {}, []
+def _closed(
+    cell: Cell, placement: np.ndarray, s: np.ndarray, start: dict[str, np.ndarray], free: Offsets | None
+) -> tuple[dict[str, np.ndarray], list[Unclosed]]:
+    """Return configurations near others: the positioner's, then the robots' that follow it; and what stays open."""
+    found, bad, table = {}, [], None
+    if cell.positioner is not None:
+        name = cell.positioner.name
+        table, off = turn_upright(cell, placement, s, start[name])
+        found[name] = table
+        bad += [Unclosed(name, float(s[i]), 0.0, float(off[i])) for i in np.flatnonzero(~(off <= posture_limit(cell)))]
     for station in cell.stations:
-        path = q[station.name]
-        start = (path[split] + path[split + 1]) / 2
-        found[station.name], error = close_chain(station, ref.required_pose(cell, station, c, middle), start)
+        wanted = ref.required_pose(cell, station, placement, s, table, free)
+        found[station.name], error = close_chain(station, wanted, start[station.name])
         position, rotation = ref.error_size(error)
         for i in np.flatnonzero(~((position <= CLOSED) & (rotation <= CLOSED))):
-            bad.append(Unclosed(station.name, float(middle[i]), float(position[i]), float(rotation[i])))
-    return middle, found, bad
+            bad.append(Unclosed(station.name, float(s[i]), float(position[i]), float(rotation[i])))
+    return found, bad
+
+
+def _joints_of_pieces(cell: Cell, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return where pieces of the seam join between samples: after which, at which parameter, at what share."""
+    at = breaks(cell)
+    if cell.seam.closed:
+        at = np.sort(s[0] + (at - s[0]) % 1.0)
+    after = np.searchsorted(s, at, side="right") - 1
+    inside = (after >= 0) & (after < len(s) - 1)
+    after, at = after[inside], at[inside]
+    before, beyond = at - s[after], s[after + 1] - at
+    new = (before > SAME_S) & (beyond > SAME_S)
+    return after[new], at[new], (before / (before + beyond))[new]
 
 
 def _one_turn_on(path: np.ndarray) -> np.ndarray:
@@ -154,36 +224,24 @@ def _one_turn_on(path: np.ndarray) -> np.ndarray:
     return path[0] + 2 * np.pi * np.round((path[-1] - path[0]) / (2 * np.pi))
 
 
-def _ends(cell: Cell, c: np.ndarray, s: np.ndarray, q: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return capsule ends in W by station name, and of the workpiece under the empty name, each (M, ends, 3) [m]."""
-    ends = {"": ref.workpiece_ends(cell, ref.workpiece_pose(cell, c, s))}
+def _ends(
+    cell: Cell, placement: np.ndarray, s: np.ndarray, q: dict[str, np.ndarray], free: Offsets | None
+) -> dict[str, np.ndarray]:
+    """Return capsule ends in W by name, each (M, ends, 3) [m]; the workpiece's with the positioner's, or under ''."""
+    ends = {}
     for station in cell.stations:
         T_W_L = ref.link_poses(station, q[station.name])
         ends[station.name] = ref.body_ends(station, T_W_L, ref.tcp_pose(station, T_W_L))
+    if cell.positioner is None:
+        ends[""] = ref.workpiece_ends(cell, ref.workpiece_pose(cell, placement, s, free=free))
+    else:
+        table = q[cell.positioner.name]
+        own = ref.positioner_ends(cell, ref.positioner_links(cell, placement, table))
+        carried = ref.workpiece_ends(cell, ref.workpiece_pose(cell, placement, s, table))
+        ends[cell.positioner.name] = np.concatenate([own, carried], axis=1)
     return {name: x.reshape(len(s), 2 * x.shape[1], 3) for name, x in ends.items()}
 
 
 def _steps_m(ends: np.ndarray) -> np.ndarray:
     """Return the longest way of any body end in each interval, shape (K - 1,) [m]."""
     return np.linalg.norm(np.diff(ends, axis=0), axis=-1).max(axis=-1, initial=0.0)
-
-
-def _too_long(cell: Cell, q: dict[str, np.ndarray], ends: dict[str, np.ndarray]) -> np.ndarray:
-    """Tell which intervals are to be halved, shape (K - 1,)."""
-    far = [_steps_m(x) > cell.constraints.verify_step_m for x in ends.values()]
-    return np.any([*far, *(np.abs(np.diff(x, axis=0)).max(axis=1) > JOINT_STEP_RAD for x in q.values())], axis=0)
-
-
-def _jumps(cell: Cell, s: np.ndarray, q: dict[str, np.ndarray], ends: dict[str, np.ndarray]) -> list[Jump]:
-    """Return what is still too long after all halving, in the order of the seam."""
-    jumps = []
-    limit_m = cell.constraints.verify_step_m
-    for name, path in q.items():
-        turn, way = np.abs(np.diff(path, axis=0)), _steps_m(ends[name])
-        for i in np.flatnonzero((turn.max(axis=1) > JOINT_STEP_RAD) | (way > limit_m)):
-            joint = int(turn[i].argmax())
-            if turn[i, joint] > JOINT_STEP_RAD:
-                jumps.append(Jump(name, joint, float(s[i]), float(turn[i, joint]), float(JOINT_STEP_RAD), "rad"))
-            else:
-                jumps.append(Jump(name, joint, float(s[i]), float(way[i]), limit_m, "m"))
-    return jumps

@@ -5,12 +5,13 @@ import math
 import numpy as np
 
 from nlpweld.errors import PlanError
-from nlpweld.plan import Plan
+from nlpweld.plan import Plan, joint_counts, wrong_freedom, wrong_points
 from nlpweld.verify import rules
 from nlpweld.verify.between import whole_motion
+from nlpweld.verify.freedom import Offsets
 from nlpweld.verify.measures import Measures, measure
 from nlpweld.verify.report import Report, Violation, worst_first
-from nlpweld.verify.scene import Scene, look
+from nlpweld.verify.scene import Scene, joint_steps, look
 
 LARGEST = 1e9  # [m] or [rad]; beyond it squares overflow and cosines mean nothing
 
@@ -28,10 +29,12 @@ def verify(plan: Plan) -> Report:
     _refuse_wrong_shapes(plan)
     infinite = _not_finite(plan)
     if infinite:
-        return Report.without_plan(plan.cell, plan.placement_m, len(plan.s), infinite)
-    c = np.asarray(plan.placement_m, dtype=float)
-    paths = {st.name: np.asarray(plan.paths[st.name], dtype=float) for st in plan.cell.stations}
-    scene = look(plan.cell, c, whole_motion(plan.cell, c, np.asarray(plan.s, dtype=float), paths))
+        return Report.without_plan(plan.cell, plan.placement, len(plan.s), infinite)
+    paths = {name: np.asarray(plan.paths[name], dtype=float) for name in joint_counts(plan.cell)}
+    s = np.asarray(plan.s, dtype=float)
+    free = None if plan.freedom is None else Offsets(s, plan.cell.seam.closed, plan.freedom)
+    motion = whole_motion(plan.cell, plan.placement, s, paths, free)
+    scene = look(plan.cell, plan.placement, motion)
     at = scene.motion.at
     measures = measure(
         plan.cell,
@@ -48,6 +51,7 @@ def _report(plan: Plan, scene: Scene, measures: Measures, violations: tuple[Viol
     return Report(
         cell=plan.cell.name,
         at=(x, y, z),
+        yaw_rad=float(plan.yaw_rad),
         n_points=len(plan.s),
         reading=plan.cell.objective.reading,
         mmr_mean=float(measures.mmr.mean()),
@@ -63,8 +67,10 @@ def _report(plan: Plan, scene: Scene, measures: Measures, violations: tuple[Viol
         closest_pair=scene.table.pair_labels[pair],
         closest_s=float(plan.s[point]),
         joint_margin_rad=min(float(m.min()) for m in scene.joint_margin.values()),
+        joint_step_rad=max(float(steps.max()) for steps in joint_steps(plan.cell, plan.paths).values()),
         closure_m=max(float(e[0].max()) for e in scene.closure.values()),
         closure_rad=max(float(e[1].max()) for e in scene.closure.values()),
+        posture_rad=float(scene.off_upright.max()),
         samples=len(scene.motion.s),
         feasible=not violations,
         violations=violations,
@@ -97,22 +103,35 @@ def _profile(plan: Plan, scene: Scene, measures: Measures) -> dict[str, np.ndarr
 def _refuse_wrong_shapes(plan: Plan) -> None:
     if np.shape(plan.placement_m) != (3,):
         raise PlanError(f"placement_m: shape {np.shape(plan.placement_m)}, not (3,); give x, y and z")
-    n = len(plan.s)
-    if np.ndim(plan.s) != 1 or n < 3 or not (np.diff(plan.s) > 0).all() or plan.s[0] < 0 or plan.s[-1] >= 1:
-        raise PlanError("s: not at least three increasing numbers in [0, 1); take seam_parameters(cell)")
-    names = [station.name for station in plan.cell.stations]
-    if set(plan.paths) != set(names):
-        raise PlanError(f"paths: for {sorted(plan.paths)}, but the cell has {sorted(names)}; give one for each robot")
-    for station in plan.cell.stations:
-        shape, want = np.shape(plan.paths[station.name]), (n, len(station.robot.joints))
+    if np.shape(plan.yaw_rad) != ():
+        raise PlanError(f"yaw_rad: shape {np.shape(plan.yaw_rad)}, not a number")
+    wrong = wrong_points(plan.cell, plan.s)
+    if wrong:
+        raise PlanError(f"s: {wrong}; take seam_parameters(cell)")
+    counts = joint_counts(plan.cell)
+    if set(plan.paths) != set(counts):
+        raise PlanError(f"paths: for {sorted(plan.paths)}, but the cell has {sorted(counts)}; give one for each")
+    for name, joints in counts.items():
+        shape, want = np.shape(plan.paths[name]), (len(plan.s), joints)
         if shape != want:
-            raise PlanError(f"paths.{station.name}: shape {shape}, not {want}; solve again")
+            raise PlanError(f"paths.{name}: shape {shape}, not {want}; solve again")
+    _refuse_wrong_freedom(plan)
+
+
+def _refuse_wrong_freedom(plan: Plan) -> None:
+    freedom = plan.freedom or {}
+    wrong = wrong_freedom(plan.cell, freedom)
+    if wrong:
+        raise PlanError(f"freedom{wrong}")
+    for name, offsets in freedom.items():
+        if np.shape(offsets) != (len(plan.s),):
+            raise PlanError(f"freedom.{name}: shape {np.shape(offsets)}, not {(len(plan.s),)}; solve again")
 
 
 def _not_finite(plan: Plan) -> list[Violation]:
     """Return what holds NaN or infinity: no comparison with it can be believed."""
     found, nan = [], math.nan
-    if not (np.abs(plan.placement_m) < LARGEST).all():
+    if not (np.abs(plan.placement) < LARGEST).all():
         found.append(Violation("finite", None, None, nan, nan, note="the placement holds NaN or infinity, or nearly"))
     for name, path in plan.paths.items():
         bad = np.argwhere(~(np.abs(path) < LARGEST))
@@ -120,4 +139,11 @@ def _not_finite(plan: Plan) -> list[Violation]:
             point, joint, s = int(bad[0][0]), f"J{bad[0][1] + 1}", float(plan.s[bad[0][0]])
             text = "the path holds NaN or infinity, or nearly"
             found.append(Violation("finite", name, point, nan, nan, s=s, joint=joint, note=text))
+    for name, offsets in (plan.freedom or {}).items():
+        beyond = np.flatnonzero(~(np.abs(offsets) < LARGEST))
+        if len(beyond):
+            kind, robot = rules.angle_of(name)
+            text = "the free angle holds NaN or infinity, or nearly"
+            point, s = int(beyond[0]), float(plan.s[beyond[0]])
+            found.append(Violation("finite", robot, point, nan, nan, s=s, joint=kind, note=text))
     return found

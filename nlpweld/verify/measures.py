@@ -1,6 +1,7 @@
-"""The measures of Pan et al. by their definitions: products of manipulabilities, common volumes, and MMR."""
+"""The measures by their definitions: products of manipulabilities, common volumes, and MMR (Pan et al.)."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -10,6 +11,10 @@ from nlpweld.cell import Cell
 
 DIRECTIONS = 2000
 MM3_PER_M3 = 1e9
+OF_ALL: dict[str, Callable[..., np.ndarray]] = {
+    "product": np.prod,
+    "mean": np.mean,
+}  # readings that do not tell tight from loose robots
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,8 +22,8 @@ class Measures:
     """Measures at M configurations.
 
     Attributes:
-        mmr: reading of eq. (16), shape (M,).
-        m_tight: product of the tight robots' w (eq. 15), shape (M,) [m^3 each].
+        mmr: the cell's objective: a reading of eq. (16), or product or mean of all w, shape (M,).
+        m_tight: product of the tight robots' w (eq. 15), shape (M,) [m^3 each]; NaN where there are none.
         m_loose: product of the loose robots' w, shape (M,).
         common_volume: Vol(E_1 ∩ ... ∩ E_n) of the velocity ellipsoids, shape (M,).
         ratio: r_k = Vol(∩) / V_k by station name, each of shape (M,).
@@ -35,7 +40,7 @@ def measure(cell: Cell, w: dict[str, np.ndarray], Jv: dict[str, np.ndarray]) -> 
     """Return every measure of the cell's robots.
 
     Args:
-        cell: tells which robots are tight and which loose, and the reading of eq. (16).
+        cell: tells which robots are tight and which loose, and the reading.
         w: manipulability by station name, each of shape (M,) [m^3].
         Jv: translational rows of the Jacobian by station name, each of shape (M, 3, n) [m/rad].
     """
@@ -45,10 +50,13 @@ def measure(cell: Cell, w: dict[str, np.ndarray], Jv: dict[str, np.ndarray]) -> 
         ratio = {name: common / ellipsoid_volume(core) for name, core in cores.items()}
     tight = [s.name for s in cell.stations if s.coupling.kind == "tight"]
     loose = [s.name for s in cell.stations if s.coupling.kind == "loose"]
-    m_tight = np.prod([w[name] for name in tight], axis=0)
     m_loose = np.prod([w[name] for name in loose], axis=0)
-    beta = (np.mean([ratio[name] for name in tight], axis=0), np.mean([ratio[name] for name in loose], axis=0))
-    mmr = read(cell.objective.reading, beta, (m_tight, m_loose), (len(tight), len(loose)))
+    m_tight = np.prod([w[name] for name in tight], axis=0) if tight else np.full_like(m_loose, math.nan)
+    if cell.objective.reading in OF_ALL:
+        mmr = OF_ALL[cell.objective.reading](list(w.values()), axis=0)
+    else:
+        beta = (np.mean([ratio[name] for name in tight], axis=0), np.mean([ratio[name] for name in loose], axis=0))
+        mmr = read(cell.objective.reading, beta, (m_tight, m_loose), (len(tight), len(loose)))
     return Measures(mmr, m_tight, m_loose, common, ratio)
 
 
@@ -58,7 +66,7 @@ def read(
     """Return MMR by one reading of Pan et al., eq. (16).
 
     Args:
-        reading: one of ``nlpweld.cell.READINGS``.
+        reading: one of ``nlpweld.cell.READINGS`` but those in ``OF_ALL``.
         beta: weights of the tight and the loose part, each of shape (M,).
         m: M_tight and M_loose, each of shape (M,).
         count: numbers of tight and loose robots.

@@ -6,8 +6,11 @@ Every function works on M configurations at once; poses are homogeneous matrices
 
 import numpy as np
 
-from nlpweld.cell import Cell, Grasp, Robot, Station
+from nlpweld.cell import Body, Cell, Grasp, Robot, Station, TorchAngles
 from nlpweld.geometry.seam import weld_frames
+from nlpweld.verify.freedom import Offsets, spun, turned_work
+
+Offset = np.ndarray | float
 
 
 def rpy_matrix(rpy_deg: tuple[float, float, float]) -> np.ndarray:
@@ -53,12 +56,26 @@ def link_poses(station: Station, q: np.ndarray) -> np.ndarray:
         station: the robot at its place.
         q: joint angles, shape (M, n) [rad].
     """
-    steps = joint_transforms(station.robot, q)
-    poses = np.empty((q.shape[0], q.shape[1] + 1, 4, 4))
-    poses[:, 0] = base_pose(station)
-    for i in range(q.shape[1]):
-        poses[:, i + 1] = poses[:, i] @ steps[:, i]
-    return poses
+    return _chain(base_pose(station), joint_transforms(station.robot, q))
+
+
+def placement_pose(placement: np.ndarray) -> np.ndarray:
+    """Return T_W_P, shape (4, 4), of x, y, z [m] and yaw [rad]; of three numbers without yaw."""
+    x, y, z, yaw = (*placement, 0.0)[:4]
+    return _pose(_axis_angle(np.array([0.0, 0.0, 1.0]), yaw), np.array([x, y, z]))
+
+
+def positioner_links(cell: Cell, placement: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return T_W_L of the positioner's link 0 (its base B) to its last, the table T, shape (M, n + 1, 4, 4).
+
+    Args:
+        cell: a cell with a positioner; its base stands in {P}.
+        placement: of {P} in W, shape (3,) or (4,) [m; rad].
+        q: joint angles, shape (M, n) [rad].
+    """
+    assert cell.positioner is not None
+    T_P_B = _pose(rpy_matrix(cell.positioner.base_rpy_deg), np.array(cell.positioner.base_position_m))
+    return _chain(placement_pose(placement) @ T_P_B, joint_transforms(cell.positioner.robot, q))
 
 
 def tcp_pose(station: Station, T_W_L: np.ndarray) -> np.ndarray:
@@ -89,12 +106,13 @@ def manipulability(J: np.ndarray) -> np.ndarray:
 
 def body_ends(station: Station, T_W_L: np.ndarray, T_W_E: np.ndarray) -> np.ndarray:
     """Return both axis ends of every capsule of arm and tool in W, shape (M, bodies, 2, 3) [m]."""
-    ends = np.empty((T_W_L.shape[0], len(station.bodies), 2, 3))
-    for b, body in enumerate(station.bodies):
-        for e, end in enumerate((body.start, body.end)):
-            T = T_W_E if end.frame == "tcp" else T_W_L[:, int(end.frame.removeprefix("link"))]
-            ends[:, b, e] = T[:, :3, :3] @ np.array(end.at_m) + T[:, :3, 3]
-    return ends
+    return _capsule_ends(station.bodies, T_W_L, T_W_E)
+
+
+def positioner_ends(cell: Cell, T_W_L: np.ndarray) -> np.ndarray:
+    """Return both axis ends of every capsule of the positioner in W, shape (M, bodies, 2, 3) [m]."""
+    assert cell.positioner is not None
+    return _capsule_ends(cell.positioner.robot.bodies, T_W_L, T_W_L[:, -1])
 
 
 def workpiece_ends(cell: Cell, T_W_C: np.ndarray) -> np.ndarray:
@@ -119,36 +137,104 @@ def flat_rotation(normal: np.ndarray) -> np.ndarray:
     return _axis_angle(axis, np.arctan2(sine, normal[:, 2]))
 
 
-def workpiece_pose(cell: Cell, c: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return T_W_C(s) = (R(s), c): the workpiece turned flat for each weld point, shape (M, 4, 4).
+def workpiece_pose(
+    cell: Cell,
+    placement: np.ndarray,
+    s: np.ndarray,
+    table: np.ndarray | None = None,
+    free: Offsets | None = None,
+) -> np.ndarray:
+    """Return T_W_C, shape (M, 4, 4): where the positioner's joints put it, or turned flat for each weld point.
+
+    Without a positioner C stands at the origin of {P}, turned flat, then as its free angles say, then with {P}.
 
     Args:
         cell: the cell; its seam and posture are used.
-        c: origin of C in W, shape (3,) [m].
-        s: seam parameter, shape (M,); whole turns do not matter.
+        placement: of {P} in W, shape (3,) or (4,) [m; rad].
+        s: seam parameter, shape (M,); of no account where there is a positioner.
+        table: joint angles of the positioner, shape (M, n) [rad], where there is one.
+        free: offsets of free angles; a positioner leaves the workpiece none.
     """
-    return _pose(flat_rotation(weld_frames(cell, s).normal_C), c)
+    if cell.positioner is not None:
+        assert table is not None
+        T_T_C = _pose(rpy_matrix(cell.positioner.mount_rpy_deg), np.array(cell.positioner.mount_position_m))
+        return positioner_links(cell, placement, table)[:, -1] @ T_T_C
+    T_W_P = placement_pose(placement)
+    R_P_C = flat_rotation(weld_frames(cell, s).normal_C)
+    if free is not None:
+        R_C_p, turn = weld_pose(cell, s)[:, :3, :3], np.radians(cell.posture.turn_deg)
+        across_C = np.cos(turn) * R_C_p[..., 1] + np.sin(turn) * R_C_p[..., 2]
+        axes_P = R_P_C @ np.stack([R_C_p[..., 0], across_C], axis=-1)
+        R_P_C = turned_work(R_P_C, axes_P[..., 0], axes_P[..., 1], free.at(s))
+    return _pose(T_W_P[:3, :3] @ R_P_C, T_W_P[:3, 3])
 
 
-def required_pose(cell: Cell, station: Station, c: np.ndarray, s: np.ndarray) -> np.ndarray:
+def weld_pose(cell: Cell, s: np.ndarray, seam: str = "main") -> np.ndarray:
+    """Return T_C_p, shape (M, 4, 4): x along the tangent, z along the weld normal (Zhang et al., Fig. 1)."""
+    weld = weld_frames(cell, s, seam)
+    across = np.cross(weld.normal_C, weld.tangent_C)
+    return _pose(np.stack([weld.tangent_C, across, weld.normal_C], axis=-1), weld.p_C)
+
+
+def torch_pose(angles: TorchAngles, travel: Offset = 0.0, work: Offset = 0.0) -> np.ndarray:
+    """Return T_p_E of a torch held against the weld (Zhang et al., eq. 4), shape (..., 4, 4), from direction cosines.
+
+    z_H, from the weld to the torch, has cos(travel) along x_p and cos(work) along y_p; x_H is across y_p and turned by
+    the spin; the TCP's z axis is -z_H and its x axis x_H.
+
+    Args:
+        angles: how it is held.
+        travel: offset of the travel angle, any shape (...) [rad].
+        work: offset of the work angle, of the same shape; together they may ask for a direction that there is not, and
+            then get no unit vector.
+    """
+    along, across = (np.cos(np.radians(a) + u) for a, u in ((angles.travel_deg, travel), (angles.work_deg, work)))
+    up = np.sqrt(np.maximum(0.0, 1.0 - along**2 - across**2))
+    z, width = np.stack([along, across, up], axis=-1), np.hypot(along, up)[..., None]
+    x = np.stack([up, np.zeros_like(up), -along], axis=-1)
+    x = np.where(width > 1e-12, x / np.maximum(width, 1e-12), [1.0, 0.0, 0.0])  # along y_p there is no across
+    spin = np.radians(angles.spin_deg)
+    x = np.cos(spin) * x + np.sin(spin) * np.cross(z, x)
+    return _pose(np.stack([x, np.cross(x, z), -z], axis=-1), angles.stand_off_m * z)
+
+
+def required_pose(
+    cell: Cell,
+    station: Station,
+    placement: np.ndarray,
+    s: np.ndarray,
+    table: np.ndarray | None = None,
+    free: Offsets | None = None,
+) -> np.ndarray:
     """Return the T_W_E that the weld asks of one robot, shape (M, 4, 4).
 
-    A handler is rigid to the workpiece (Pan et al., eq. 1, 4, 5). The torch's TCP is at the weld point with
-    z straight down and x along the heading (eq. 2).
+    A handler is rigid to the workpiece (Pan et al., eq. 1, 4, 5). A torch's TCP is at the point of its own seam, with
+    z straight down and x along the heading in W (eq. 2), or held against the weld frame there (Zhang et al., eq. 13,
+    14). The workpiece is where the positioner's own joints put it, so that loops close on what is and not on what
+    should be. Where a torch's spin is free it is about the TCP's z axis.
 
     Args:
         cell: the cell.
         station: one of its stations.
-        c: origin of C in W, shape (3,) [m].
+        placement: of {P} in W, shape (3,) or (4,) [m; rad].
         s: seam parameter, shape (M,).
+        table: joint angles of the positioner, shape (M, n) [rad], where there is one.
+        free: offsets of free angles, if any.
     """
-    T_W_C = workpiece_pose(cell, c, s)
-    if isinstance(station.coupling, Grasp):
-        return T_W_C @ station.coupling.T_C_E
-    p_C = weld_frames(cell, s).p_C
-    heading = np.radians(station.coupling.heading_deg)
+    T_W_C, coupling = workpiece_pose(cell, placement, s, table, free), station.coupling
+    if isinstance(coupling, Grasp):
+        return T_W_C @ coupling.T_C_E
+    u = free.at(s) if free else {}
+    spin = u.get(f"spin.{station.name}")
+    if coupling.angles is not None:
+        tilts = (u.get(f"{name}.{station.name}", 0.0) for name in ("travel", "work"))
+        return spun(T_W_C @ weld_pose(cell, s, coupling.seam) @ torch_pose(coupling.angles, *tilts), spin)
+    p_C = weld_frames(cell, s, coupling.seam).p_C
+    assert coupling.heading_deg is not None
+    heading = np.radians(coupling.heading_deg)
     x, z = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([0.0, 0.0, -1.0])
-    return _pose(np.column_stack([x, np.cross(z, x), z]), np.einsum("mij,mj->mi", T_W_C[:, :3, :3], p_C) + c)
+    p_W = np.einsum("mij,mj->mi", T_W_C[:, :3, :3], p_C) + T_W_C[:, :3, 3]
+    return spun(_pose(np.column_stack([x, np.cross(z, x), z]), p_W), spin)
 
 
 def pose_error(T_W_D: np.ndarray, T_W_E: np.ndarray) -> np.ndarray:
@@ -165,6 +251,25 @@ def pose_error(T_W_D: np.ndarray, T_W_E: np.ndarray) -> np.ndarray:
 def error_size(error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (position error [m], rotation angle [rad]), each of shape (M,), of errors of shape (M, 6)."""
     return np.linalg.norm(error[:, :3], axis=-1), np.linalg.norm(error[:, 3:], axis=-1)
+
+
+def _chain(T_W_B: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return link poses (M, n + 1, 4, 4) from a base pose (4, 4) and joint transforms (M, n, 4, 4)."""
+    poses = np.empty((steps.shape[0], steps.shape[1] + 1, 4, 4))
+    poses[:, 0] = T_W_B
+    for i in range(steps.shape[1]):
+        poses[:, i + 1] = poses[:, i] @ steps[:, i]
+    return poses
+
+
+def _capsule_ends(bodies: tuple[Body, ...], T_W_L: np.ndarray, T_W_E: np.ndarray) -> np.ndarray:
+    """Return axis ends in W, shape (M, bodies, 2, 3) [m], of bodies that hang on links and TCP."""
+    ends = np.empty((T_W_L.shape[0], len(bodies), 2, 3))
+    for b, body in enumerate(bodies):
+        for e, end in enumerate((body.start, body.end)):
+            T = T_W_E if end.frame == "tcp" else T_W_L[:, int(end.frame.removeprefix("link"))]
+            ends[:, b, e] = T[:, :3, :3] @ np.array(end.at_m) + T[:, :3, 3]
+    return ends
 
 
 def _axis_angle(axis: np.ndarray, angle: np.ndarray | float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import math
 import textwrap
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -12,8 +13,10 @@ from nlpweld.cell import Cell
 # An excess of this size [in the constraint's own unit] counts as equally bad; constraints not named come first.
 SCALE = {
     ("box", "m"): 0.05,
+    ("box", "rad"): 0.1,
     ("closure", "m"): 1e-3,
     ("closure", "rad"): 1e-3,
+    ("posture", "rad"): 0.01,
     ("continuity", "rad"): 0.1,
     ("continuity", "m"): 0.01,
     ("branch", "m"): 0.1,
@@ -21,7 +24,10 @@ SCALE = {
     ("joint_limit", "rad"): 0.1,
     ("singularity", "m^3"): 0.02,
     ("clearance", "m"): 0.02,
+    ("freedom", "rad"): 0.1,
+    ("joint_step", "rad"): 0.1,
 }
+WHOLE = {"product": "product of w", "mean": "mean of w"}  # objectives that are no MMR
 SHOWN = 8
 WIDTH = 79
 
@@ -31,14 +37,16 @@ class Violation:
     """One broken constraint, at the worst place.
 
     Attributes:
-        constraint: ``finite``, ``points``, ``box``, ``closure``, ``continuity``, ``branch``, ``joint_limit``,
-            ``singularity``, ``clearance`` or ``reach``.
-        robot: station name (of the first body of a pair), ``workpiece``, or None where no robot is to blame.
+        constraint: ``finite``, ``points``, ``box``, ``closure``, ``posture``, ``continuity``, ``branch``,
+            ``joint_limit``, ``singularity``, ``clearance``, ``freedom``, ``joint_step`` or ``reach``.
+        robot: name of a station (of the first body of a pair) or of the positioner, ``workpiece``, or None where no
+            robot is to blame.
         point: index of the plan's point at or before the place, or None.
         value: what was found, in ``unit``.
         limit: what it may be at most or at least.
         s: seam parameter of the place.
-        joint: ``J1`` to ``Jn``.
+        joint: ``J1`` to ``Jn``, or the axis of a placement, ``x``, ``y``, ``z`` or ``yaw``, or
+            a free angle, ``yaw``, ``slope``, ``rotation``, ``spin``, ``travel`` or ``work``.
         pair: the two bodies.
         unit: of value and limit.
         note: what the numbers alone do not say.
@@ -82,18 +90,19 @@ class Report:
     """Everything the checker found out about one plan or placement.
 
     ``*_mean``, ``mmr_min``, ``mmr_max``, ``manipulability_min`` and ``clearance_m`` are over the N points of the seam.
-    ``clearance_along_m``, ``joint_margin_rad`` and ``singularity_min`` are over the whole seam, between the points too;
-    these decide.
+    ``clearance_along_m``, ``joint_margin_rad``, ``posture_rad`` and ``singularity_min`` are over the whole seam,
+    between the points too; these decide.
 
     Attributes:
         cell: name of the cell.
-        at: placement of the origin of C in W [m].
+        at: placement of the origin of {P} in W [m]: of C where robots carry the workpiece.
+        yaw_rad: turn of {P} about z_W [rad].
         n_points: number of points N.
-        reading: the reading of Pan et al., eq. (16), that MMR has.
+        reading: the reading of Pan et al., eq. (16), that MMR has, or ``product`` or ``mean`` of all robots' w.
         mmr_mean: the objective; its unit depends on the reading ("paper" adds m^6 to m^3).
         mmr_min: least of the N points.
         mmr_max: greatest of the N points.
-        m_tight_mean: mean product of the tight robots' w (eq. 15) [m^3 for each].
+        m_tight_mean: mean product of the tight robots' w (eq. 15) [m^3 for each]; NaN where there are none.
         m_loose_mean: mean product of the loose robots' w [m^3 for each].
         manipulability_mean: by station name [m^3].
         manipulability_min: by station name [m^3].
@@ -102,9 +111,11 @@ class Report:
         clearance_along_m: the same along the whole seam.
         closest_pair: the two bodies of that pair.
         closest_s: where on the seam.
-        joint_margin_rad: least distance of any joint from a limit; negative is beyond.
+        joint_margin_rad: least distance of any joint, the positioner's too, from a limit; negative is beyond.
+        joint_step_rad: farthest any robot's joint turns from one point to the next, a closed seam's way back included.
         closure_m: largest position error of any TCP at the points.
         closure_rad: largest rotation error of any TCP at the points.
+        posture_rad: how far the positioner is from holding the weld upright; 0 without a positioner.
         samples: number of configurations looked at.
         feasible: no violation.
         violations: worst first, one for each constraint, robot or pair, and joint.
@@ -113,6 +124,7 @@ class Report:
 
     cell: str
     at: tuple[float, float, float]
+    yaw_rad: float
     n_points: int
     reading: str
     mmr_mean: float
@@ -128,8 +140,10 @@ class Report:
     closest_pair: str | None
     closest_s: float | None
     joint_margin_rad: float
+    joint_step_rad: float
     closure_m: float
     closure_rad: float
+    posture_rad: float
     samples: int
     feasible: bool
     violations: tuple[Violation, ...]
@@ -139,7 +153,7 @@ class Report:
     def without_plan(
         cls,
         cell: Cell,
-        at: tuple[float, float, float] | np.ndarray,
+        at: Sequence[float] | np.ndarray,
         n_points: int,
         violations: list[Violation] | tuple[Violation, ...],
     ) -> "Report":
@@ -147,18 +161,20 @@ class Report:
 
         Args:
             cell: the cell.
-            at: origin of C in W [m].
+            at: placement of {P} in W, x, y, z [m] and, if given, yaw [rad].
             n_points: number of seam points asked for.
             violations: why there is no plan, e.g. :func:`unreachable`; never feasible, even if empty.
         """
         nan = math.nan
+        x, y, z, yaw = (float(value) for value in (*at, 0.0)[:4])
         each = {station.name: nan for station in cell.stations}
         return cls(
-            cell=cell.name, at=_triple(at), n_points=n_points, reading=cell.objective.reading,
+            cell=cell.name, at=(x, y, z), yaw_rad=yaw, n_points=n_points, reading=cell.objective.reading,
             mmr_mean=nan, mmr_min=nan, mmr_max=nan, m_tight_mean=nan, m_loose_mean=nan,
             manipulability_mean=each, manipulability_min=dict(each), singularity_min=dict(each),
             clearance_m=nan, clearance_along_m=nan, closest_pair=None, closest_s=None,
-            joint_margin_rad=nan, closure_m=nan, closure_rad=nan,
+            joint_margin_rad=nan, joint_step_rad=nan, closure_m=nan, closure_rad=nan,
+            posture_rad=nan if cell.positioner else 0.0,
             samples=0, feasible=False, violations=worst_first(violations),
         )  # fmt: skip
 
@@ -184,18 +200,15 @@ class Report:
 
     def _headline(self) -> list[str]:
         at = ", ".join(f"{x:.4g}" for x in self.at)
+        yaw = f", yaw {math.degrees(self.yaw_rad):.4g} deg" if self.yaw_rad else ""
         count = len(self.violations)
         verdict = "feasible" if self.feasible else f"NOT feasible: {count} violation{'s' * (count != 1)}"
-        return textwrap.wrap(f"{self.cell} at ({at}) m, {self.n_points} points: {verdict}", WIDTH)
+        return textwrap.wrap(f"{self.cell} at ({at}) m{yaw}, {self.n_points} points: {verdict}", WIDTH)
 
     def _numbers(self) -> list[str]:
         if not self.samples:
             return ["  no plan to measure"]
-        lines = [
-            f"  MMR ({self.reading})".ljust(20) + f"mean {self.mmr_mean:.6g}, {self.mmr_min:.6g} to {self.mmr_max:.6g}",
-            f"  M_tight, M_loose  mean {self.m_tight_mean:.6g}, {self.m_loose_mean:.6g}",
-            "  w [m^3]           mean       least at points   along the seam",
-        ]
+        lines = [*self._objective(), "  w [m^3]           mean       least at points   along the seam"]
         for name, mean in self.manipulability_mean.items():
             least, along = self.manipulability_min[name], self.singularity_min[name]
             lines.append(f"    {name:<15.15} {mean:<10.6f} {least:<17.6f} {along:.6f}")
@@ -203,28 +216,40 @@ class Report:
         whole = f"{1e3 * self.clearance_along_m:.3f} mm along the seam"
         clearance = f"  clearance         {1e3 * self.clearance_m:.3f} mm{pair}; {whole}"
         lines += textwrap.wrap(clearance, WIDTH, subsequent_indent=" " * 20)
-        return [
-            *lines,
-            f"  joint margin      {math.degrees(self.joint_margin_rad):.3f} deg",
-            f"  closure           {self.closure_m:.1e} m, {self.closure_rad:.1e} rad; {self.samples} configurations",
-        ]
+        lines.append(f"  joint margin      {math.degrees(self.joint_margin_rad):.3f} deg")
+        lines.append(f"  joint step        {math.degrees(self.joint_step_rad):.3f} deg")
+        if self.posture_rad:
+            lines.append(f"  posture           {self.posture_rad:.1e} rad from upright")
+        closure = f"{self.closure_m:.1e} m, {self.closure_rad:.1e} rad"
+        return [*lines, f"  closure           {closure}; {self.samples} configurations"]
+
+    def _objective(self) -> list[str]:
+        """Return the lines on objective and products, without those that say nothing in this cell."""
+        label = f"  {WHOLE.get(self.reading, f'MMR ({self.reading})')}"
+        lines = [label.ljust(20) + f"mean {self.mmr_mean:.6g}, {self.mmr_min:.6g} to {self.mmr_max:.6g}"]
+        if not math.isnan(self.m_tight_mean):
+            lines.append(f"  M_tight, M_loose  mean {self.m_tight_mean:.6g}, {self.m_loose_mean:.6g}")
+        elif self.reading != "product":  # without tight robots M_loose is the product
+            lines.append(f"  M_loose           mean {self.m_loose_mean:.6g}")
+        return lines
 
 
 def unreachable(
-    cell: Cell, at: tuple[float, float, float] | np.ndarray, robot: str, point: int, n_points: int, note: str = ""
+    cell: Cell, at: Sequence[float] | np.ndarray, robot: str, point: int, n_points: int, note: str = ""
 ) -> Report:
     """Return the report of a placement where one robot cannot reach one seam point.
 
     Args:
         cell: the cell.
-        at: origin of C in W [m].
-        robot: station name.
+        at: placement of {P} in W, x, y, z [m] and, if given, yaw [rad].
+        robot: name of a station or of the positioner.
         point: index of the seam point, of n_points.
         n_points: number of seam points asked for.
         note: more about it, e.g. which joint limit is in the way.
     """
     text = note or "no joint angles within the limits reach the pose the weld asks for"
-    violation = Violation("reach", robot, point, math.nan, math.nan, s=point / n_points, note=text)
+    s = point / (n_points if cell.seam.closed else n_points - 1)
+    violation = Violation("reach", robot, point, math.nan, math.nan, s=s, note=text)
     return Report.without_plan(cell, at, n_points, [violation])
 
 
@@ -235,11 +260,6 @@ def worst_first(violations: list[Violation] | tuple[Violation, ...]) -> tuple[Vi
         if violation.key not in kept or violation.severity > kept[violation.key].severity:
             kept[violation.key] = violation
     return tuple(sorted(kept.values(), key=lambda v: -v.severity))
-
-
-def _triple(at: tuple[float, float, float] | np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in at)
-    return x, y, z
 
 
 def _plain(value: Any) -> Any:

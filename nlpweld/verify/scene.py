@@ -9,6 +9,7 @@ from nlpweld.verify import reference as ref
 from nlpweld.verify.between import Motion
 from nlpweld.verify.bodies import BodyTable, all_ends, body_table, floor_distances
 from nlpweld.verify.exact import pair_distances, shared
+from nlpweld.verify.upright import off_upright
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,11 +18,13 @@ class Scene:
 
     Attributes:
         motion: the samples.
-        links: T_W_L, each of shape (K, n + 1, 4, 4).
+        links: T_W_L, the positioner's too, each of shape (K, n + 1, 4, 4).
         J: geometric Jacobian at the TCP, each of shape (K, 6, n).
         w: manipulability, each of shape (K,) [m^3].
         closure: position error [m] and rotation error [rad] at the N points, each of shape (2, N).
-        joint_margin: distance of every joint from its lower and its upper limit, each of shape (K, n, 2) [rad].
+        off_upright: how far the positioner is from holding the weld upright, shape (K,) [rad]; zero without one.
+        joint_margin: distance of every joint from its lower and its upper limit, the positioner's too, each of shape
+            (K, n, 2) [rad].
         table: bodies and pairs.
         clearance_m: distance of every pair, then of every body above the floor, shape (K, P + F).
     """
@@ -31,17 +34,18 @@ class Scene:
     J: dict[str, np.ndarray]
     w: dict[str, np.ndarray]
     closure: dict[str, np.ndarray]
+    off_upright: np.ndarray
     joint_margin: dict[str, np.ndarray]
     table: BodyTable
     clearance_m: np.ndarray
 
 
-def look(cell: Cell, c: np.ndarray, motion: Motion) -> Scene:
+def look(cell: Cell, placement: np.ndarray, motion: Motion) -> Scene:
     """Return everything about a motion.
 
     Args:
         cell: the cell.
-        c: origin of C in W, shape (3,) [m].
+        placement: of {P} in W, shape (3,) or (4,) [m; rad].
         motion: the samples.
 
     Raises:
@@ -51,16 +55,54 @@ def look(cell: Cell, c: np.ndarray, motion: Motion) -> Scene:
     tcps = {st.name: ref.tcp_pose(st, links[st.name]) for st in cell.stations}
     J = {name: ref.jacobian(links[name], tcps[name]) for name in links}
     w = {name: ref.manipulability(jacobian) for name, jacobian in J.items()}
-    closure = {}
-    for st in cell.stations:
-        wanted = ref.required_pose(cell, st, c, motion.s[motion.at])
-        closure[st.name] = np.stack(ref.error_size(ref.pose_error(wanted, tcps[st.name][motion.at])))
-    margin = {}
-    for st in cell.stations:
-        lower, upper = st.robot.limits_rad.T
-        margin[st.name] = np.stack([motion.q[st.name] - lower, upper - motion.q[st.name]], axis=-1)
+    turned, off = None, np.zeros(len(motion.s))
+    if cell.positioner is not None:
+        turned = motion.q[cell.positioner.name]
+        links[cell.positioner.name] = ref.positioner_links(cell, placement, turned)
+    T_W_C = ref.workpiece_pose(cell, placement, motion.s, turned, motion.free)
+    if cell.positioner is not None:
+        off = off_upright(cell, T_W_C, motion.s)
     table = body_table(cell)
-    ends = all_ends(cell, ref.workpiece_pose(cell, c, motion.s), links, tcps)
+    ends = all_ends(cell, T_W_C, links, tcps)
     pairs = pair_distances(shared(), ends, table.radius_m, table.pairs)
     clearance = np.concatenate([pairs, floor_distances(table, ends)], axis=1)
-    return Scene(motion, links, J, w, closure, margin, table, clearance)
+    closure = _closure(cell, placement, motion, tcps)
+    return Scene(motion, links, J, w, closure, off, joint_margins(cell, motion.q), table, clearance)
+
+
+def limits_rad(cell: Cell) -> dict[str, np.ndarray]:
+    """Return the joint limits of every station and of the positioner, by name, each of shape (n, 2) [rad]."""
+    limits = {station.name: station.robot.limits_rad for station in cell.stations}
+    return limits | ({cell.positioner.name: cell.positioner.robot.limits_rad} if cell.positioner else {})
+
+
+def joint_margins(cell: Cell, q: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return by name how far joints (K, n) are from their lower and upper limits, each of shape (K, n, 2) [rad]."""
+    limits = limits_rad(cell)
+    return {name: np.stack([q[name] - rows[:, 0], rows[:, 1] - q[name]], axis=-1) for name, rows in limits.items()}
+
+
+def joint_steps(cell: Cell, paths: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return how far joints turn from each point to the next, by station name, each of shape (N or N - 1, n) [rad].
+
+    The last row of a closed seam is the way back to the first point, less whole turns.
+    """
+    steps = {}
+    for station in cell.stations:
+        q = np.asarray(paths[station.name], dtype=float)
+        steps[station.name] = np.abs(np.diff(q, axis=0))
+        if cell.seam.closed:
+            back = q[0] - q[-1]
+            back -= 2 * np.pi * np.round(back / (2 * np.pi))
+            steps[station.name] = np.vstack([steps[station.name], np.abs(back)])
+    return steps
+
+
+def _closure(cell: Cell, placement: np.ndarray, motion: Motion, tcps: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return position and rotation errors at the points, by station name, each of shape (2, N)."""
+    at, closure = motion.at, {}
+    turned = motion.q[cell.positioner.name][at] if cell.positioner else None
+    for st in cell.stations:
+        wanted = ref.required_pose(cell, st, placement, motion.s[at], turned, motion.free)
+        closure[st.name] = np.stack(ref.error_size(ref.pose_error(wanted, tcps[st.name][at])))
+    return closure

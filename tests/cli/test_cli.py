@@ -140,7 +140,7 @@ def test_compare_tables_and_plots_from_stored_records(call, tmp_path):
         (["evaluate", "three_er16", "--at", "0", "0"], "--at"),
         (["evaluate", "three_er16", "--placement", "nowhere"], "paper"),
         (["evaluate", "three_er16", *PAPER, "--branches", "back"], "front"),
-        (["evaluate", "three_er16", *PAPER, "--reading", "mean"], "harmonic"),
+        (["evaluate", "three_er16", *PAPER, "--reading", "median"], "harmonic"),
         (["evaluate", "three_er16", *PAPER, "--points", "0"], "--points"),
         (["solve", "three_er16", "--solver", "gaa"], "'ga'"),
         (["solve", "three_er16", "--formulation", "ful"], "reduced"),
@@ -169,7 +169,7 @@ def test_bad_input_is_one_line_and_status_two(call, tmp_path, arguments, told):
 
 
 def test_a_robot_with_an_offset_wrist_is_told_from_the_cell_file(call, tmp_path):
-    from nlpweld.cell.load import LIBRARY
+    from nlpweld.cell.files import LIBRARY
 
     robot = (LIBRARY / "robots" / "er16_1600.toml").read_text()
     offset = robot.replace("{ a_m = 0.0, d_m = 0.0, alpha_deg = -90.0", "{ a_m = 0.0, d_m = 0.05, alpha_deg = -90.0")

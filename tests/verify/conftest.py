@@ -12,6 +12,8 @@ from nlpweld.verify.check import verify
 from nlpweld.verify.report import Report
 
 from .helpers import cell_with, changed
+from .welders import PLACES
+from .welders import plan as plan_of_welders
 
 AT = np.array([0.023, -0.266, 0.404])
 # The model's joint angles at the paper's placement and point 0, one wrist, in degrees.
@@ -68,3 +70,28 @@ def rng() -> np.random.Generator:
 def coarse(plan: Plan) -> Plan:
     cell = cell_with(plan.cell, seam={"points": 6})
     return changed(plan, cell=cell, s=np.arange(6) / 6, paths={name: q[::12] for name, q in plan.paths.items()})
+
+
+@pytest.fixture(scope="session")
+def dual() -> Cell:
+    return load_cell("dual_welder_positioner")
+
+
+@pytest.fixture(scope="session")
+def dual_plan(dual: Cell) -> Plan:
+    return plan_of_welders(dual, PLACES["A"])
+
+
+@pytest.fixture(scope="session")
+def dual_report(dual_plan: Plan) -> Report:
+    return verify(dual_plan)
+
+
+@pytest.fixture(scope="session")
+def single() -> Cell:
+    return load_cell("robot_positioner")
+
+
+@pytest.fixture(scope="session")
+def single_plan(single: Cell) -> Plan:
+    return plan_of_welders(single, (0.0, -1.0))

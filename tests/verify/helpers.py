@@ -41,6 +41,30 @@ def with_limits(cell: Cell, name: str, joint: int, **limits: float) -> Cell:
     return cell.model_copy(update={"stations": tuple(stations)})
 
 
+def station_with(cell: Cell, index: int, **fields: Any) -> Cell:
+    """Return a copy of a cell with some fields of the coupling of one robot replaced, unchecked."""
+    stations = list(cell.stations)
+    coupling = stations[index].coupling.model_copy(update=fields)
+    stations[index] = stations[index].model_copy(update={"coupling": coupling})
+    return cell.model_copy(update={"stations": tuple(stations)})
+
+
+def turned_about(cell: Cell, origin: np.ndarray, yaw: float) -> Cell:
+    """Return a copy of a cell with its robots and their headings turned about a vertical line, any yaw allowed."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    R, stations = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), []
+    for station in cell.stations:
+        base = origin + R @ (np.array(station.base_position_m) - origin)
+        roll, pitch, old = station.base_rpy_deg
+        rpy, coupling = (roll, pitch, old + np.degrees(yaw)), station.coupling
+        if getattr(coupling, "heading_deg", None) is not None:
+            coupling = coupling.model_copy(update={"heading_deg": coupling.heading_deg + np.degrees(yaw)})
+        moved = {"base_position_m": tuple(base), "base_rpy_deg": rpy, "coupling": coupling}
+        stations.append(station.model_copy(update=moved))
+    turned = cell.model_copy(update={"stations": tuple(stations)})
+    return cell_with(turned, search={"yaw_deg": (-180.0, 180.0)})
+
+
 def found(report: Report, constraint: str) -> list[Violation]:
     assert not report.feasible
     return [v for v in report.violations if v.constraint == constraint]

@@ -92,7 +92,13 @@ def test_verifying_twice_gives_the_same(plan: Plan, report: Report):
     [
         (
             "nlpweld.verify.check",
-            ("casadi", "nlpweld.kinematics", "nlpweld.formulation", "nlpweld.solvers", "nlpweld.geometry.posture"),
+            (
+                "casadi",
+                "nlpweld.kinematics",
+                "nlpweld.formulation",
+                "nlpweld.solvers",
+                *(f"nlpweld.geometry.{m}" for m in ("posture", "capsules", "weld_angles", "torch_angles")),
+            ),
         ),
         ("nlpweld.verify.worker", ("casadi", "scipy", "pydantic")),
     ],

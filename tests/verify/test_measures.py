@@ -91,3 +91,21 @@ def test_other_readings(cell, inputs, reading):
     got = measures.measure(other, *inputs).mmr
     np.testing.assert_allclose(got, READINGS[reading](*by_hand(*inputs)), rtol=1e-12)
     assert not np.allclose(got, measures.measure(cell, *inputs).mmr)
+
+
+OF_ALL = {"product": lambda a, b, c: a * b * c, "mean": lambda a, b, c: (a + b + c) / 3}
+
+
+@pytest.mark.parametrize("reading", OF_ALL)
+def test_readings_that_tell_no_robots_apart(cell, inputs, reading):
+    got = measures.measure(cell_with(cell, objective={"reading": reading}), *inputs)
+    np.testing.assert_allclose(got.mmr, OF_ALL[reading](*inputs[0].values()), rtol=1e-12)
+    np.testing.assert_allclose(got.m_tight, inputs[0]["handler_1"] * inputs[0]["handler_2"])
+
+
+def test_cell_without_handlers_has_no_tight_product(dual, rng):
+    w = {name: rng.uniform(0.1, 0.6, size=4) for name in ("robot_1", "robot_2")}
+    got = measures.measure(dual, w, {name: rng.normal(size=(4, 3, 6)) for name in w})
+    assert np.isnan(got.m_tight).all()
+    np.testing.assert_allclose(got.m_loose, w["robot_1"] * w["robot_2"])
+    np.testing.assert_array_equal(got.mmr, got.m_loose)

@@ -3,8 +3,11 @@
 import json
 import math
 
+import numpy as np
 import pytest
 
+from nlpweld.plan import Plan
+from nlpweld.verify.check import verify
 from nlpweld.verify.report import SHOWN, Report, Violation, unreachable, worst_first
 
 
@@ -86,3 +89,45 @@ def test_text_fits_a_terminal(cell, report: Report, count):
 
 def test_violation_text_names_joint_point_and_units():
     assert str(violation(1.25)) == "joint_limit handler_1 J4 at point 7 (s 0.1000): 1.25 rad, limit 1"
+
+
+def with_fields(report: Report, **fields) -> Report:
+    return Report(**{**{name: getattr(report, name) for name in report.__dataclass_fields__}, **fields})
+
+
+def test_text_of_a_cell_without_handlers_says_nothing_of_them(dual_report: Report):
+    text = str(dual_report)
+    assert max(len(line) for line in text.splitlines()) <= 79
+    assert "product of w      mean 0.22696," in text
+    assert "posture  " in text
+    assert not [word for word in ("M_tight", "M_loose", "MMR", "nan", "yaw") if word in text]
+    other = str(with_fields(dual_report, reading="mean"))
+    assert "mean of w         mean" in other
+    assert "M_loose           mean 0.22696" in other
+
+
+def test_text_of_a_free_workpiece_says_nothing_of_posture(report: Report):
+    assert "M_tight, M_loose  mean 0.21594, 0.423846" in str(report)
+    assert "MMR (paper)       mean 0.284151" in str(report)
+    assert "posture" not in str(report)
+    assert report.posture_rad == 0.0
+
+
+def test_yaw_is_told_where_there_is_one(dual_report: Report):
+    assert "at (-0.5, -1.3, 0.5) m, yaw -12 deg, 72 points" in str(with_fields(dual_report, yaw_rad=np.radians(-12)))
+    assert dual_report.to_json()["yaw_rad"] == 0.0
+
+
+def test_json_of_a_cell_with_a_positioner_is_strict(dual_plan: Plan):
+    data = verify(dual_plan).to_json(profile=True)
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert 0 <= data["posture_rad"] < 1e-9
+    assert len(data["at"]) == 3
+
+
+def test_placement_with_yaw_but_without_a_plan(dual):
+    report = unreachable(dual, (0.5, -1.0, 0.5, 0.2), "robot_2", 71, 72)
+    assert (report.at, report.yaw_rad) == ((0.5, -1.0, 0.5), 0.2)
+    assert report.violations[0].s == 1.0  # the last point of an open seam is its end
+    assert math.isnan(report.posture_rad)
+    assert json.loads(json.dumps(report.to_json(), allow_nan=False))["posture_rad"] is None
