@@ -9,6 +9,7 @@ INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --constrain
 
 reproduce: $(VENV)/.stamp-main
 	$(RUN) experiments/reproduce_paper.py
+	$(RUN) experiments/reproduce_positioner.py
 
 test: $(VENV)/.stamp-test
 	$(RUN) -m pytest

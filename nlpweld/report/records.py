@@ -10,7 +10,7 @@ import pandas as pd
 from nlpweld.errors import OptionError, OutputError
 
 FORMAT = "nlpweld-record"
-VERSION = 1  # the newest version of a record that is understood here
+VERSION = 2  # the newest version of a record that is understood here
 AXES = ("x_m", "y_m", "z_m")
 PLAIN = ("cell", "formulation", "solver", "preset", "seed", "status", "message")
 NUMBERS = ("claimed_objective", "evaluations", "build_s", "solve_s", "wall_s")
@@ -82,6 +82,21 @@ def load_baselines(folder: str | Path) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=None if rows else ["name", "cell", *AXES, "feasible", *MEASURES])
 
 
+def load_reference(folder: str | Path) -> pd.Series:
+    """Return the best objective that sampling found in each cell, by cell, of a study that has ``data/reference.csv``.
+
+    Raises:
+        OutputError: the file is broken.
+    """
+    path = Path(folder) / "data" / "reference.csv"
+    if not path.is_file():
+        return pd.Series(dtype=float)
+    try:
+        return pd.read_csv(path).set_index("cell")["mmr_mean"].astype(float)
+    except (OSError, ValueError, KeyError) as error:
+        raise OutputError(f"{path}: not a table of references ({_what(error)}); make it again") from None
+
+
 def read_record(path: Path) -> dict[str, Any]:
     """Read one record.
 
@@ -146,7 +161,8 @@ def _report(path: Path, report: dict[str, Any] | None) -> dict[str, Any]:
 def _step(path: Path, index: int, step: dict[str, Any]) -> dict[str, Any]:
     try:
         numbers = {name: _number(step[name]) for name in ("time_s", "evaluations", "best", "mean")}
-        at = {name: _number(step["placement"].get(name)) for name in AXES}
+        place = step["placement"] if "placement" in step else dict(zip(AXES, step["x"], strict=False))  # version 1
+        at = {name: _number(place.get(name)) for name in AXES}
         return {"step": index, **numbers, "spread_m": _number(step["spread"]), **at}
     except (KeyError, TypeError, ValueError) as error:
         raise OutputError(f"{path}: trace: {_what(error)}; remove the record and run it again") from None

@@ -1,4 +1,4 @@
-"""How every figure looks: printed 85 mm wide, readable in grey and by colour-blind eyes."""
+"""How every figure looks: printed 85 or 170 mm wide, readable in grey and by colour-blind eyes."""
 
 from typing import Any
 
@@ -51,9 +51,9 @@ RC: dict[str, Any] = {
 }
 
 
-def figure(height_mm: float = 60.0) -> Figure:
-    """Return an empty figure, 85 mm wide; tight_layout and the like are not needed."""
-    return Figure(figsize=(WIDTH_IN, height_mm / 25.4), layout="constrained")
+def figure(height_mm: float = 60.0, columns: int = 1) -> Figure:
+    """Return an empty figure, 85 mm wide for each column; tight_layout and the like are not needed."""
+    return Figure(figsize=(columns * WIDTH_IN, height_mm / 25.4), layout="constrained")
 
 
 def space(fig: Figure, elevation: float = 22.0, azimuth: float = -60.0, **where: Any) -> Any:
@@ -71,10 +71,10 @@ def space(fig: Figure, elevation: float = 22.0, azimuth: float = -60.0, **where:
     return axes
 
 
-def equal_scales(axes: Any) -> None:
+def equal_scales(axes: Any, zoom: float = ZOOM) -> None:
     """Give a metre the same length along all three axes, as far as the data goes."""
     limits = [getattr(axes, f"get_{axis}lim")() for axis in "xyz"]
-    axes.set_box_aspect([high - low for low, high in limits], zoom=ZOOM)
+    axes.set_box_aspect([high - low for low, high in limits], zoom=zoom)
 
 
 def name_axes(axes: Axes, x: str, y: str, title: str = "") -> None:

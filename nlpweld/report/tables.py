@@ -8,21 +8,22 @@ from rich.markup import escape
 from rich.table import Table
 
 from nlpweld.plan import write_text
-from nlpweld.report.records import AXES, load_baselines, load_records
+from nlpweld.report.records import AXES, load_baselines, load_records, load_reference
 
 GROUP = ["cell", "formulation", "solver", "preset"]
 HEADINGS = {
     "runs": "runs", "claimed": "solved", "verified": "verified", "mmr": "MMR mean ± sd", "mmr_best": "best",
-    "mmr_share_percent": "% of best", "evaluations_median": "evals", "build_median_s": "build s",
-    "solve_median_s": "solve s", "to_reference_mm": "to C mm",
+    "mmr_share_percent": "% of best", "regret_percent": "regret %", "evaluations_median": "evals",
+    "build_median_s": "build s", "solve_median_s": "solve s", "to_reference_mm": "to C mm",
 }  # fmt: skip
 FORMATS = {
     "runs": "{:.0f}", "claimed": "{:.0f}", "verified": "{:.0f}", "mmr_best": "{:.5f}", "mmr_share_percent": "{:.2f}",
-    "evaluations_median": "{:.0f}", "build_median_s": "{:.2f}", "solve_median_s": "{:.2f}", "to_reference_mm": "{:.1f}",
+    "regret_percent": "{:z.3f}", "evaluations_median": "{:.0f}", "build_median_s": "{:.2f}", "solve_median_s": "{:.2f}",
+    "to_reference_mm": "{:.1f}",
 }  # fmt: skip
 NARROW = {
-    "verified": "veri-\nfied", "MMR mean ± sd": "MMR\nmean ± sd", "% of best": "% of\nbest", "evals": "evals\nmedian",
-    "build s": "build\n[s]", "solve s": "solve\n[s]", "to C mm": "to C\n[mm]",
+    "verified": "veri-\nfied", "MMR mean ± sd": "MMR\nmean ± sd", "% of best": "% of\nbest", "regret %": "regret\n[%]",
+    "evals": "evals\nmedian", "build s": "build\n[s]", "solve s": "solve\n[s]", "to C mm": "to C\n[mm]",
 }  # fmt: skip
 SMALLEST_SPREAD = 1e-5  # what five decimals can show
 WIDE = 100  # columns of a screen that takes the whole summary
@@ -48,7 +49,7 @@ def write_tables(folder: str | Path) -> pd.DataFrame:
     """
     folder = Path(folder)
     runs = load_records(folder)
-    table = summary(runs, load_baselines(folder))
+    table = summary(runs, load_baselines(folder), load_reference(folder))
     tables = folder / "tables"
     write_text(tables / "runs.csv", runs.to_csv(index=False))
     write_text(tables / "summary.csv", table.to_csv(index=False))
@@ -57,25 +58,31 @@ def write_tables(folder: str | Path) -> pd.DataFrame:
     return table
 
 
-def summary(runs: pd.DataFrame, baselines: pd.DataFrame) -> pd.DataFrame:
+def summary(runs: pd.DataFrame, baselines: pd.DataFrame, reference: pd.Series | None = None) -> pd.DataFrame:
     """Return the summary of runs and baselines.
 
     Mean, spread, best, share and distance are over verified runs alone; medians are over all runs that came to an
     end by themselves. ``mmr_share_percent`` is the mean as a share of the best verified MMR in the same cell;
-    ``to_reference_mm`` the distance of the row's best placement from the cell's first baseline (the paper's C).
+    ``to_reference_mm`` the distance of the row's best placement from the cell's first baseline (the paper's C). With a
+    reference, ``regret_percent`` is by how much of it the mean falls short, and stands in place of the distance.
 
     Args:
         runs: as from :func:`nlpweld.report.records.load_records`.
         baselines: as from :func:`nlpweld.report.records.load_baselines`.
+        reference: as from :func:`nlpweld.report.records.load_reference`.
     """
     rows = [{**dict(zip(GROUP, key, strict=True)), **_solver_row(group)} for key, group in runs.groupby(GROUP)]
     rows += [_baseline_row(row) for _, row in baselines.iterrows()]
     table = pd.DataFrame(rows)
     best = table.groupby("cell")["mmr_best"].transform("max")
     table["mmr_share_percent"] = 100 * table["mmr_mean"] / best
-    table["to_reference_mm"] = _distance_mm(table, baselines)
+    if reference is None or reference.empty:
+        table["to_reference_mm"] = _distance_mm(table, baselines)
+    else:
+        best = reference.reindex(table["cell"]).to_numpy()
+        table["regret_percent"] = (100 * (best - table["mmr_mean"]) / best).round(9) + 0.0
     table = table.astype(dict.fromkeys(COUNTS, "Int64"))
-    order = [*GROUP, *("mmr_mean" if name == "mmr" else name for name in HEADINGS)]
+    order = [*GROUP, *("mmr_mean" if name == "mmr" else name for name in HEADINGS if name == "mmr" or name in table)]
     order.insert(order.index("mmr_mean") + 1, "mmr_std")
     order.insert(order.index("verified") + 1, "failed")
     return table.sort_values("cell", kind="stable")[[*order, *AXES]].reset_index(drop=True)
@@ -160,6 +167,8 @@ def _as_text(table: pd.DataFrame) -> pd.DataFrame:
     text = pd.DataFrame(index=table.index)
     text["solver"] = [_label(row, table["formulation"]) for _, row in table.iterrows()]
     for name, heading in HEADINGS.items():
+        if name != "mmr" and name not in table:
+            continue
         values = _mean_and_spread(table) if name == "mmr" else [_shown(v, FORMATS[name]) for v in table[name]]
         text[heading] = values
     return text

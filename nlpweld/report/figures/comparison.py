@@ -43,7 +43,7 @@ def mmr_by_solver(study: Study, cell: str) -> Figure:
     _reference(axes, study.baselines, cell)
     axes.margins(y=0.1)
     _solver_axis(axes, runs, labels)
-    style.name_axes(axes, "solver (verified of runs)", _mmr_label(runs, "mean MMR"), cell)
+    style.name_axes(axes, "solver (verified of runs)", objective_label(runs, "mean"), cell)
     _legend_of_marks(axes, bool((~runs["verified"] & runs["mmr_mean"].notna()).any()))
     return fig
 
@@ -82,9 +82,8 @@ def progress(study: Study, cell: str) -> Figure:
         axes.step(grid, middle, where="post", color=colour, ls=style.LINES[i % len(style.LINES)], label=label)
     _reference(axes, study.baselines, cell)
     style.plain_log(axes.xaxis)
-    style.name_axes(
-        axes, "evaluations", _mmr_label(study.runs, "best MMR so far"), f"{cell}: median, quartiles of seeds"
-    )
+    label = objective_label(study.runs[study.runs["cell"] == cell], "best", " so far")
+    style.name_axes(axes, "evaluations", label, f"{cell}: median, quartiles of seeds")
     style.legend_below(axes, 3)
     return fig
 
@@ -114,9 +113,17 @@ def _quartiles(best: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(result[1]), result, np.nan)
 
 
-def _mmr_label(runs: pd.DataFrame, what: str) -> str:
-    """Return an axis label; eq. (16) of Pan et al. adds m^6 to m^3, so the unit of length is all there is to say."""
-    return f"{what} [lengths in {'mm' if (runs['reading'] == 'millimetres').any() else 'm'}]"
+def objective_label(runs: pd.DataFrame, before: str, after: str = "") -> str:
+    """Return what the runs of one cell maximise, with its unit, for an axis.
+
+    Eq. (16) of Pan et al. adds m^6 to m^3, so the unit of length is all there is to say of it.
+    """
+    readings = set(runs["reading"].dropna())
+    if readings == {"product"}:
+        robots = sum(name.startswith("manipulability_mean_") for name in runs.dropna(axis="columns", how="all").columns)
+        factors = " ".join(f"w_{i}" for i in range(1, robots + 1)) if robots > 1 else "w"
+        return f"{before} ${factors}${after} [m$^{3 * robots}$]"
+    return f"{before} MMR{after} [lengths in {'mm' if 'millimetres' in readings else 'm'}]"
 
 
 def _strip(axes: Axes, place: int, runs: pd.DataFrame, column: str, colour: str) -> None:
@@ -141,8 +148,15 @@ def _solver_axis(axes: Axes, runs: pd.DataFrame, labels: list[str]) -> None:
 
 
 def _reference(axes: Axes, baselines: pd.DataFrame, cell: str) -> None:
-    for _, row in baselines[(baselines["cell"] == cell) & baselines["feasible"].astype(bool)].iterrows():
-        axes.axhline(row["mmr_mean"], color=style.INK, linestyle=":", linewidth=1.0, label=row["name"])
+    """Draw the feasible baselines; a single one is named in the legend, several are named on their lines."""
+    own = baselines[(baselines["cell"] == cell) & baselines["feasible"].astype(bool)]
+    for _, row in own.iterrows():
+        label = row["name"] if len(own) == 1 else None
+        axes.axhline(row["mmr_mean"], color=style.INK, linestyle=":", linewidth=1.0, label=label)
+        if label is None:
+            look = {"ha": "right", "va": "bottom", "fontsize": 6.5}
+            at = {"xy": (1.0, row["mmr_mean"]), "xycoords": ("axes fraction", "data")}
+            axes.annotate(row["name"], xytext=(-2, 0), textcoords="offset points", **at, **look)
 
 
 def _legend_of_marks(axes: Axes, unverified: bool) -> None:

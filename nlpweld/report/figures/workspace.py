@@ -1,6 +1,7 @@
 """The cooperative workspace, seen: slices of S with MMR, the first constraint that fails, and where solvers went."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -44,8 +45,11 @@ def slice_of_s(study: Study, held: str, kind: str) -> Figure:
     height = PLOT_MM * np.ptp(window[1]) / np.ptp(window[0])
     fig = style.figure(min(height, 100.0) + BELOW_MM)
     axes = fig.add_subplot()
-    _tints(axes, table, across, up)
-    _mmr(fig, axes, table, across, up)
+    tints(axes, table, across, up)
+    mesh = value_mesh(axes, table, across, up)
+    fig.colorbar(
+        mesh, ax=axes, location="bottom", shrink=0.8, aspect=36, label="mean MMR where feasible [m$^6$ + m$^3$]"
+    )
     _marks(axes, study, across, up)
     axes.set_aspect("equal")
     axes.set(xlim=window[0], ylim=window[1])
@@ -63,7 +67,8 @@ def _grid(table: pd.DataFrame, across: str, up: str, column: str) -> tuple[np.nd
     return matrix.columns.to_numpy(), matrix.index.to_numpy(), matrix.to_numpy()
 
 
-def _tints(axes: Axes, table: pd.DataFrame, across: str, up: str) -> None:
+def tints(axes: Axes, table: pd.DataFrame, across: str, up: str) -> None:
+    """Colour and hatch a map by the first constraint that fails."""
     codes = {name: float(i) for i, name in enumerate(FAILING)}
     x, y, code = _grid(table.assign(code=table["first_failing"].map(codes)), across, up, "code")
     colours = ListedColormap(list(FAILING.values()))
@@ -77,13 +82,11 @@ def _tints(axes: Axes, table: pd.DataFrame, across: str, up: str) -> None:
             inside.set_linewidth(0.0)
 
 
-def _mmr(fig: Figure, axes: Axes, table: pd.DataFrame, across: str, up: str) -> None:
+def value_mesh(axes: Axes, table: pd.DataFrame, across: str, up: str) -> Any:
+    """Colour a map by the objective where it is feasible, and return what a colour bar needs."""
     value = table["mmr"].where(table["first_failing"] == "feasible")
     x, y, mmr = _grid(table.assign(value=value), across, up, "value")
-    mesh = axes.pcolormesh(x, y, mmr, cmap="viridis", shading="nearest", rasterized=True)
-    fig.colorbar(
-        mesh, ax=axes, location="bottom", shrink=0.8, aspect=36, label="mean MMR where feasible [m$^6$ + m$^3$]"
-    )
+    return axes.pcolormesh(x, y, mmr, cmap="viridis", shading="nearest", rasterized=True)
 
 
 def _marks(axes: Axes, study: Study, across: str, up: str) -> None:
@@ -103,15 +106,14 @@ def _marks(axes: Axes, study: Study, across: str, up: str) -> None:
 def _legend(fig: Figure, axes: Axes, table: pd.DataFrame) -> None:
     handles, _ = axes.get_legend_handles_labels()
     handles.insert(0, axes.plot([], [], ".", color=style.INK, markersize=3, label="GA's individuals")[0])
-    present = [name for name in FAILING if (table["first_failing"] == name).any()]
-    handles += [
-        Patch(
-            facecolor=FAILING[n],
-            hatch=HATCHES[n],
-            edgecolor="#B5B5B5",
-            linewidth=0,
-            label=f"fails: {n.replace('_', ' ')}",
-        )
-        for n in present
-    ]
+    handles += failing_patches(table)
     fig.legend(handles=handles, loc="outside lower center", ncols=2)
+
+
+def failing_patches(table: pd.DataFrame) -> list[Patch]:
+    """Return one legend entry for each constraint that fails first somewhere on a map."""
+    present = [name for name in FAILING if (table["first_failing"] == name).any()]
+    shared = {"edgecolor": "#B5B5B5", "linewidth": 0}
+    return [
+        Patch(facecolor=FAILING[n], hatch=HATCHES[n], label=f"fails: {n.replace('_', ' ')}", **shared) for n in present
+    ]
