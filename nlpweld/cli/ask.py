@@ -103,7 +103,8 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
         budget = Budget(asked.evaluations, asked.time_limit_s)
         watched = replace(nlp, evaluate=counted)
         answer = solve_(watched, name, seed=asked.seed, budget=budget, preset=preset or "default")
-    plan_path = answer.plan.save(out / "plan.json") if answer.plan is not None and out is not None else None
+    keep = answer.plan if answer.outcome.status != "INFEASIBLE" else None  # a near miss is reported, not planned
+    plan_path = keep.save(out / "plan.json") if keep is not None and out is not None else None
     outcome, report = answer.outcome, answer.report
     facts = {
         "solver": asked.solver,
@@ -124,7 +125,10 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
         print(f"{asked.solver}, seed {asked.seed}: {outcome.status} ({outcome.message})")
         print(f"  {outcome.evaluations} evaluations, build {outcome.build_s:.2f} s, solve {outcome.solve_s:.2f} s")
         print(report or "no answer to verify")
-        print(f"plan: {plan_path}" if plan_path else "add --out DIR to keep the plan")
+        if keep is None:
+            print("no plan: nothing feasible was found; above is the nearest miss")
+        else:
+            print(f"plan: {plan_path}" if plan_path else "add --out DIR to keep the plan")
     return 0 if answer.verified else 1
 
 

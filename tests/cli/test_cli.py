@@ -4,21 +4,9 @@ import json
 
 import pytest
 
-from nlpweld.cli import main
 from nlpweld.plan import load_plan
 
 PAPER = ["--at", "0.023", "-0.266", "0.404"]
-
-
-@pytest.fixture
-def call(capsys):
-    def call(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main([str(a) for a in arguments])
-        shown = capsys.readouterr()
-        return ended.value.code, shown.out, shown.err
-
-    return call
 
 
 def test_evaluate_json_is_one_object_that_agrees_with_the_independent_prototype(call):
