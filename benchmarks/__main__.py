@@ -1,4 +1,4 @@
-"""Everything that is reported, by one command: ``python -m benchmarks``; about four minutes.
+"""Everything that is reported, by one command: ``python -m benchmarks``; about ten minutes.
 
 Each part has a process of its own, so that the memory one takes does not count for the next.
 """
@@ -6,5 +6,5 @@ Each part has a process of its own, so that the memory one takes does not count 
 import subprocess
 import sys
 
-for part in ("benchmarks.ratios", "benchmarks.scaling"):
+for part in ("benchmarks.ratios", "benchmarks.scaling", "benchmarks.forms"):
     subprocess.run([sys.executable, "-m", part], check=True)

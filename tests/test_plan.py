@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from nlpweld.cell import Cell, load_cell
 from nlpweld.errors import OutputError, PlanError
-from nlpweld.plan import Plan, joint_counts, load_plan, write_text
+from nlpweld.plan import Plan, free_names, joint_counts, load_plan, write_text
 
 CELL = load_cell("three_er16")
 DUAL = load_cell("dual_welder_positioner")  # open seam
@@ -27,7 +27,8 @@ def random_plan(cell: Cell, seed: int, points: int = 7) -> Plan:
     paths = {name: rng.normal(size=shape) * 10.0 ** rng.integers(-300, 300, shape) for name, shape in shapes.items()}
     branches = {s.name: ("front", "up", "flip") for s in cell.stations}
     s, yaw = np.sort(rng.random(points)), rng.normal()
-    return Plan(cell, rng.normal(size=3), s, paths, branches, yaw_rad=yaw)
+    freedom = {name: rng.normal(size=points) for name in free_names(cell)}
+    return Plan(cell, rng.normal(size=3), s, paths, branches, yaw_rad=yaw, freedom=freedom)
 
 
 @pytest.fixture
@@ -44,6 +45,7 @@ def test_saved_plan_comes_back_to_the_last_bit(tmp_path_factory: pytest.TempPath
     assert {name: q.tobytes() for name, q in back.paths.items()} == {n: q.tobytes() for n, q in plan.paths.items()}
     assert back.branches == plan.branches
     assert back.yaw_rad == plan.yaw_rad
+    assert {n: u.tobytes() for n, u in back.freedom.items()} == {n: u.tobytes() for n, u in plan.freedom.items()}
     assert back.placement.tolist() == [*plan.placement_m, plan.yaw_rad]
 
 
@@ -59,6 +61,36 @@ def test_plan_without_yaw_has_none(saved: Path) -> None:
     saved.write_text(json.dumps(data))
     assert load_plan(saved).yaw_rad == 0.0
     assert load_plan(saved).placement[3] == 0.0
+
+
+def test_plan_without_freedom_has_none(saved: Path) -> None:
+    """None, no table and an empty one are told apart; plans from before there was freedom have none."""
+    data = json.loads(saved.read_text())
+    assert set(data["freedom_rad"]) == {"yaw", "slope", "rotation", "spin.welder"}
+    saved.write_text(json.dumps({**data, "freedom_rad": {}}))
+    assert load_plan(saved).freedom == {}
+    saved.write_text(json.dumps({**data, "freedom_rad": None}))
+    assert load_plan(saved).freedom is None
+    assert load_plan(saved).to_json()["freedom_rad"] is None
+    del data["freedom_rad"]
+    saved.write_text(json.dumps(data))
+    assert load_plan(saved).freedom is None
+
+
+def test_free_angles_are_those_the_couplings_leave() -> None:
+    assert free_names(CELL) == ("yaw", "slope", "rotation", "spin.welder")
+    assert free_names(DUAL) == tuple(f"{a}.robot_{k}" for k in (1, 2) for a in ("spin", "travel", "work"))
+
+
+def test_freedom_is_put_on_a_copy() -> None:
+    plan = random_plan(CELL, seed=8)
+    spins = {"spin.welder": np.ones(7)}
+    other = plan.with_freedom(spins)
+    assert other.freedom == spins
+    assert other.freedom is not spins
+    assert set(plan.freedom) == set(free_names(CELL))
+    assert other.paths is plan.paths
+    assert other.with_freedom(None).freedom is None
 
 
 def test_open_seam_has_points_at_both_ends(tmp_path: Path) -> None:
@@ -151,6 +183,15 @@ CHANGES = {  # change of the plan's data, and what the message names
     "number_too_large": (put(10**400, "placement_m", 1), "placement_m: not an array of numbers"),
     "number_for_cell": (put(5, "cell"), "cell: "),
     "infinite_yaw": (put(float("inf"), "yaw_rad"), "yaw_rad: holds NaN or infinity"),
+    "freedom_list": (put([0.0], "freedom_rad"), "freedom_rad: not a table by angle"),
+    "freedom_of_no_name": (put([0.0] * 7, "freedom_rad", "pitch"), "freedom_rad.pitch: the cell has no free angle"),
+    "freedom_of_handler": (put([0.0] * 7, "freedom_rad", "spin.handler_1"), "freedom_rad.spin.handler_1: "),
+    "travel_of_heading": (put([0.0] * 7, "freedom_rad", "travel.welder"), "freedom_rad.travel.welder: "),
+    "slope_alone": (removed("freedom_rad", "rotation"), "freedom_rad.slope: alone"),
+    "rotation_alone": (removed("freedom_rad", "slope"), "freedom_rad.rotation: alone"),
+    "freedom_too_short": (removed("freedom_rad", "yaw", -1), "freedom_rad.yaw: not one number for each of 7"),
+    "freedom_too_deep": (put([[0.0]] * 7, "freedom_rad", "yaw"), "freedom_rad.yaw: not one number for each of 7"),
+    "nan_in_freedom": (put(float("nan"), "freedom_rad", "yaw", 3), "freedom_rad.yaw: holds NaN"),
     "yaw_list": (put([0.0], "yaw_rad"), "yaw_rad: not a number"),
 }
 POSITIONER_CHANGES = {
@@ -159,6 +200,8 @@ POSITIONER_CHANGES = {
     "branch": (put(["front", "up", "flip"], "branches", "positioner"), "branches.positioner: "),
     "other_name": (put([[0.0, 0.0]] * 7, "paths_rad", "table"), "paths_rad.table: "),
     "s_beyond_one": (put(1.001, "s", -1), "s: not at least two increasing numbers in [0, 1]"),
+    "yaw": (put([0.0] * 7, "freedom_rad", "yaw"), "freedom_rad.yaw: the cell has no free angle"),
+    "tilt": (put([0.0] * 7, "freedom_rad", "slope"), "freedom_rad.slope: the cell has no free angle"),
     "one_point": (put([0.1], "s"), "s: not at least two increasing numbers in [0, 1]"),
 }
 

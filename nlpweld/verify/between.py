@@ -225,7 +225,7 @@ def _one_turn_on(path: np.ndarray) -> np.ndarray:
 
 
 def _ends(
-    cell: Cell, placement: np.ndarray, s: np.ndarray, q: dict[str, np.ndarray], free: Offsets | None
+    cell: Cell, placement: np.ndarray, s: np.ndarray, q: dict[str, np.ndarray], free: Offsets | None = None
 ) -> dict[str, np.ndarray]:
     """Return capsule ends in W by name, each (M, ends, 3) [m]; the workpiece's with the positioner's, or under ''."""
     ends = {}

@@ -33,7 +33,7 @@ class Offsets:
 def turned_work(R_P_C: np.ndarray, tangent_P: np.ndarray, across_P: np.ndarray, u: dict[str, np.ndarray]) -> np.ndarray:
     """Return workpiece rotations in {P} with yaw and tilt, shape (M, 3, 3).
 
-    Rotation first, about the tangent as it is without freedom; then slope, about the horizontal across it, a positive
+    Rotation first, about the tangent as it is without freedom; then slope, about the axis across it, a positive
     one lifting the tangent's end; then yaw about the vertical. With the weld frame {p} that makes Rz(yaw) R_P_p
     Ry(-slope) Rx(rotation).
 

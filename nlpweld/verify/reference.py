@@ -188,7 +188,9 @@ def torch_pose(angles: TorchAngles, travel: Offset = 0.0, work: Offset = 0.0) ->
         work: offset of the work angle, of the same shape; together they may ask for a direction that there is not, and
             then get no unit vector.
     """
-    along, across = (np.cos(np.radians(a) + u) for a, u in ((angles.travel_deg, travel), (angles.work_deg, work)))
+    along, across = np.broadcast_arrays(
+        np.cos(np.radians(angles.travel_deg) + travel), np.cos(np.radians(angles.work_deg) + work)
+    )
     up = np.sqrt(np.maximum(0.0, 1.0 - along**2 - across**2))
     z, width = np.stack([along, across, up], axis=-1), np.hypot(along, up)[..., None]
     x = np.stack([up, np.zeros_like(up), -along], axis=-1)

@@ -157,7 +157,14 @@ def freedom(plan: Plan) -> Iterator[Violation]:
     if plan.freedom is None:
         return
     if plan.cell.freedom is None:
-        yield Violation("freedom", None, None, math.nan, math.nan, note="the cell has no [freedom] table")
+        yield Violation(
+            "freedom",
+            None,
+            None,
+            math.nan,
+            math.nan,
+            note="the cell has no [freedom] table, and the plan takes freedom",
+        )
         return
     for name, offsets in plan.freedom.items():
         kind, robot = angle_of(name)

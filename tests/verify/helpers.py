@@ -41,6 +41,11 @@ def with_limits(cell: Cell, name: str, joint: int, **limits: float) -> Cell:
     return cell.model_copy(update={"stations": tuple(stations)})
 
 
+def without_freedom(plan: Plan) -> Plan:
+    """Return a copy of a plan whose cell has no [freedom] table."""
+    return changed(plan, cell=plan.cell.model_copy(update={"freedom": None}))
+
+
 def station_with(cell: Cell, index: int, **fields: Any) -> Cell:
     """Return a copy of a cell with some fields of the coupling of one robot replaced, unchecked."""
     stations = list(cell.stations)

@@ -54,9 +54,9 @@ def table_angles(e: np.ndarray) -> np.ndarray:
     return np.stack([theta1, theta2], axis=-1)
 
 
-def torch_rotation(travel: float, work: float, spin: float) -> np.ndarray:
+def torch_rotation(travel, work, spin) -> np.ndarray:
     """Return R_p_H = Ry(phi) Rx(eta) Rz(spin), angles in degrees (Zhang et al., eq. 4)."""
-    phi = np.arcsin(min(1.0, np.cos(np.radians(travel)) / np.sin(np.radians(abs(work)))))
+    phi = np.arcsin(np.minimum(1.0, np.cos(np.radians(travel)) / np.sin(np.radians(np.abs(work)))))
     return rot("YXZ", phi, np.radians(-(90 + work)), np.radians(spin))
 
 
@@ -76,7 +76,7 @@ def joints(robot: Robot, R: np.ndarray, p: np.ndarray) -> np.ndarray:
     return q - 2 * np.pi * np.round((middle - robot.limits_rad.mean(axis=1)) / (2 * np.pi))
 
 
-def plan(cell: Cell, at: tuple[float, float], off: float = 0.0) -> Plan:
+def plan(cell: Cell, at: tuple[float, float], off: float = 0.0, freedom: dict[str, np.ndarray] | None = None) -> Plan:
     """Return the plan of one of the two cells with PB at (x, y) [m], the tilt axis off by an angle [rad]."""
     dual, n = cell.name == "dual_welder_positioner", cell.seam.points
     s = np.linspace(0, 1, n) if dual else np.arange(n) / n
@@ -91,11 +91,15 @@ def plan(cell: Cell, at: tuple[float, float], off: float = 0.0) -> Plan:
     for station in cell.stations:
         p_C, R_C_p, _ = seams[station.coupling.seam]
         held = station.coupling.angles
-        R_W_H = R_W_C @ R_C_p @ torch_rotation(held.travel_deg, held.work_deg, held.spin_deg)
-        R_W_F = R_W_H @ rot("XY", np.pi, np.radians(-22))
+        travel, work, spin = (
+            (freedom or {}).get(f"{a}.{station.name}", np.zeros(n)) for a in ("travel", "work", "spin")
+        )
+        tilt = held.travel_deg + np.degrees(travel), held.work_deg + np.degrees(work)
+        R_W_H = R_W_C @ R_C_p @ torch_rotation(*tilt, held.spin_deg)
+        R_W_F = R_W_H @ rot("XZY", np.pi, spin, np.radians(-22))
         flange_W = c + turned(R_W_C, p_C) + 0.003 * R_W_H[..., 2] - 0.40 * R_W_F[..., 2]
         R_B_W = rot("Z", np.radians(90))  # the robots look along -y
         base = np.array(station.base_position_m)
         paths[station.name] = joints(station.robot, R_B_W @ R_W_F, turned(R_B_W, flange_W - base))
     branches = {station.name: BRANCH for station in cell.stations}
-    return Plan(cell, np.array([*at, HEIGHT]), s, paths, branches)
+    return Plan(cell, np.array([*at, HEIGHT]), s, paths, branches, freedom=freedom)
