@@ -22,7 +22,7 @@ from nlpweld.formulation.cycles import Chain, Links
 from nlpweld.formulation.lattice import TURN, Arm, Joints, Lattice, Owner
 from nlpweld.formulation.redundant import STEP_MARGIN_DEG, Redundant
 
-COUNTS = {1: 72, 2: 24}  # values of each of so many spins and yaws
+COUNTS = {1: 72, 2: 36}  # values of each of so many spins and yaws
 SMOOTHING = 1e-3  # weight of the bend of control points, which decides where seam points do not
 
 

@@ -84,6 +84,7 @@ class Nlp:
         n_modes: number of discrete choices.
         widened: the same problem with margins grown by amounts for ``singularity`` [m^3], ``clearance`` [m] and
             ``joint_limit`` [rad]; None where there are none.
+        refine: ``(start, mode) -> `` a better start nearby, by other means than derivatives, or None.
         sample: ``(seed, count) -> `` start points (count, n); spread over the whole box by default.
         prepare: builds what ``evaluate`` needs, so that its cost can be told apart; None where there is nothing.
     """
@@ -99,6 +100,7 @@ class Nlp:
     relax: Callable[[int, bool], Relaxation] | None = None
     n_modes: int = 1
     widened: Callable[[dict[str, float]], "Nlp"] | None = None
+    refine: Callable[[np.ndarray, int], np.ndarray | None] | None = None
     sample: Callable[[int, int], np.ndarray] | None = None
     prepare: Callable[[], None] | None = None
 

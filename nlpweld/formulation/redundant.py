@@ -6,6 +6,7 @@ variables, not hundreds, and no path jumps. How far any joint turns from one sea
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -58,6 +59,7 @@ def redundant(cell: Cell, engine: str = "auto", level: str = "spin_yaw_tilt", co
         relax=form.relax,
         n_modes=len(form.batch.modes),
         widened=lambda extra: redundant(with_margins(cell, extra), engine, level, controls),
+        refine=form.refined,
         sample=form.starts,
         prepare=form.prepare,
     )
@@ -167,6 +169,22 @@ class Redundant:
         drawn = np.zeros((count, len(turning)))
         drawn[:, turning] = sobol(lower[: len(turning)][turning], upper[: len(turning)][turning], seed, count)
         return self.coding.constant(drawn[:, :d], drawn[:, d:])
+
+    @cached_property
+    def _lattice(self) -> Any:
+        from nlpweld.formulation.inner import lattice  # which needs this form
+
+        return lattice(self)
+
+    def refined(self, z: np.ndarray, mode: int) -> np.ndarray | None:
+        """Return variables at the placement of z whose paths are the best there are on a grid, or None.
+
+        Descents from angles that stay the same along the seam end in poor valleys where more than one angle is free.
+        """
+        from nlpweld.formulation.inner import best, start
+
+        found = best(self._lattice, z[: self.coding.d], mode, banded=True)
+        return None if found is None else start(self, found).z
 
     def relax(self, mode: int, whole: bool = False) -> Relaxation:
         """Return the relaxation on a mode's branches, with every distance if whole."""
