@@ -26,7 +26,8 @@ from nlpweld.solvers import Budget
 CELLS = ("three_er16", "dual_welder_positioner", "robot_positioner")
 FORMULATIONS = ("reduced", "full", "redundant_spin", "redundant_spin_yaw", "redundant")
 WITHOUT_YAW = ("dual_welder_positioner", "robot_positioner")  # a positioner leaves none, so that level is spin's
-LIMIT_S = 180.0
+SOLVER = {"full": "ipopt:full"}
+BUDGET = Budget(time_s=180.0)
 NEAR = 1e-3  # share of the best within which a start counts as having found it
 Record = dict[str, Any]
 
@@ -38,7 +39,7 @@ def tasks(seeds: int, cells: tuple[str, ...] = CELLS, formulations: tuple[str, .
         for name in cells
         for formulation in formulations
         if not (formulation == "redundant_spin_yaw" and name in WITHOUT_YAW)
-        for task in grid([load_cell(name)], ["ipopt"], range(seeds), [formulation], Budget(time_s=LIMIT_S))
+        for task in grid([load_cell(name)], [SOLVER.get(formulation, "ipopt")], range(seeds), [formulation], BUDGET)
     ]
 
 

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nlpweld.bench.answer import Answer, evaluate, formulate, solve
     from nlpweld.bench.compare import compare
-    from nlpweld.cell import Cell, load_cell, load_robot
+    from nlpweld.cell import Cell, load_cell, load_positioner, load_robot
     from nlpweld.errors import NlpweldError
+    from nlpweld.formulation.full import full
     from nlpweld.formulation.reduced import reduced
+    from nlpweld.formulation.redundant import redundant
     from nlpweld.plan import Plan, load_plan
     from nlpweld.solvers import Budget, solver_names
     from nlpweld.verify import Report
@@ -30,10 +32,13 @@ _HOMES = {
     "compare": "bench.compare",
     "evaluate": "bench.answer",
     "formulate": "bench.answer",
+    "full": "formulation.full",
     "load_cell": "cell",
     "load_plan": "plan",
+    "load_positioner": "cell",
     "load_robot": "cell",
     "reduced": "formulation.reduced",
+    "redundant": "formulation.redundant",
     "solve": "bench.answer",
     "solver_names": "solvers",
     "verify_plan": "verify",
@@ -49,10 +54,13 @@ __all__ = [
     "compare",
     "evaluate",
     "formulate",
+    "full",
     "load_cell",
     "load_plan",
+    "load_positioner",
     "load_robot",
     "reduced",
+    "redundant",
     "solve",
     "solver_names",
     "verify_plan",

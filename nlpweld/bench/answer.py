@@ -11,6 +11,7 @@ import numpy as np
 from nlpweld.bench.margins import ROUNDS, wider
 from nlpweld.cell.cell import Cell
 from nlpweld.errors import OptionError
+from nlpweld.formulation.full import full
 from nlpweld.formulation.nlp import Nlp
 from nlpweld.formulation.reduced import OutOfReach, reduced
 from nlpweld.formulation.redundant import REDUNDANT, redundant
@@ -21,6 +22,7 @@ from nlpweld.verify.report import unreachable
 
 FORMULATIONS: dict[str, Callable[[Cell, str], Nlp]] = {
     "reduced": reduced,
+    "full": full,
     **{name: partial(redundant, level=level) for level, name in REDUNDANT.items()},
 }
 

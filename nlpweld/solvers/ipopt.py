@@ -1,6 +1,7 @@
 """Ipopt on a penalised relaxation, sharpened until the exact model agrees (Waechter and Biegler 2006)."""
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -12,6 +13,14 @@ from nlpweld.solvers.base import Budget, Incumbent, Outcome
 
 # Each solve starts at the last one's answer, so the barrier of the box starts small and does not push it away.
 WARM = {"mu_init": 1e-6, "bound_push": 1e-6, "bound_frac": 1e-6}
+# With equalities the slope of the objective is spread over many variables and looks small beside the tolerance, so it
+# is scaled up. Ipopt's filter would trade much of the objective for violations that do not matter; a merit does not.
+EQUAL = {
+    "constr_viol_tol": 1e-9,
+    "obj_scaling_factor": 1e3,
+    "line_search_method": "penalty",
+    "watchdog_shortened_iter_trigger": 0,  # which that line search does not know
+}
 
 
 @dataclass(frozen=True)
@@ -49,6 +58,7 @@ class Ipopt:
     PRESETS: ClassVar[dict[str, dict[str, object]]] = {
         "default": {},
         "plain": {"scouts": 0, "sharpness": 3.0, "growth": 10.0},
+        "full": {"scouts": 0, "growth": 10.0},  # the full-space form brings its starts best first
     }
 
     def unsuitable(self, nlp: Nlp) -> str | None:
@@ -61,7 +71,7 @@ class Ipopt:
         run = _Run(nlp, self, search, budget)
         tried = 0
         for group in self._starts(search, seed, budget):
-            for start, mode in group:
+            for start, mode in _with_refined(nlp, group):
                 tried += 1
                 run.descend(start, mode)
                 if run.stopped:
@@ -87,6 +97,15 @@ class Ipopt:
         return [starts[: self.modes_tried], *([s] for s in starts[self.modes_tried : self.descents])]
 
 
+def _with_refined(nlp: Nlp, group: list[tuple[np.ndarray, int]]) -> Iterator[tuple[np.ndarray, int]]:
+    """Yield starts with their modes, each after what the problem makes of it, if it knows how to better one."""
+    for start, mode in group:
+        better = nlp.refine(start, mode) if nlp.refine else None
+        if better is not None:
+            yield better, mode
+        yield start, mode
+
+
 @dataclass(eq=False)
 class _Run:
     """What several descents share: built solvers, the clock, the count."""
@@ -107,7 +126,7 @@ class _Run:
         solver = self._solver(mode)
         x, before, sharpness = start, float("-inf"), self.options.sharpness
         for k in range(self.options.sharpenings):
-            solution = solver(x0=x, p=sharpness, lbx=self.nlp.lower, ubx=self.nlp.upper)
+            solution = solver(x0=x, p=sharpness, lbx=self.nlp.lower, ubx=self.nlp.upper, lbg=0.0, ubg=0.0)
             x, sharpness = np.array(solution["x"]).ravel(), sharpness * self.options.growth
             self.iterations += solver.stats()["iter_count"]
             self.last = solver.stats()["return_status"]
@@ -132,7 +151,8 @@ class _Run:
         if mode not in self.built:
             began = time.perf_counter()
             assert self.nlp.relax is not None
-            watch, relax = _Watch(self), self.nlp.relax(mode, self.whole)
+            relax = self.nlp.relax(mode, self.whole)
+            watch = _Watch(self, relax.equalities.value.size1_out(0) if relax.equalities else 0)
             self.built[mode] = (nlpsol(relax, self.options, watch), watch, relax)
             self.build_s += time.perf_counter() - began
         return self.built[mode][0]
@@ -141,9 +161,9 @@ class _Run:
 class _Watch(ca.Callback):
     """Sees every iterate of Ipopt: keeps the path, and stops when the time is up."""
 
-    def __init__(self, run: _Run) -> None:
+    def __init__(self, run: _Run, equalities: int = 0) -> None:
         ca.Callback.__init__(self)
-        self.run = run
+        self.run, self.equalities = run, equalities
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
@@ -153,10 +173,10 @@ class _Watch(ca.Callback):
         return 1
 
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        n = len(self.run.nlp.lower)
-        return {"x": ca.Sparsity.dense(n), "f": ca.Sparsity.scalar(), "lam_x": ca.Sparsity.dense(n)}.get(
-            ca.nlpsol_out(i), ca.Sparsity(0, 0) if ca.nlpsol_out(i) != "lam_p" else ca.Sparsity.scalar()
-        )
+        n, m = len(self.run.nlp.lower), self.equalities
+        sizes = {"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": 1}
+        rows = sizes[ca.nlpsol_out(i)]
+        return ca.Sparsity.dense(rows) if rows else ca.Sparsity(0, 0)
 
     def eval(self, arg: list[ca.DM]) -> list[float]:
         self.run.search.evaluations += 1
@@ -167,22 +187,16 @@ class _Watch(ca.Callback):
 def nlpsol(relax: Relaxation, options: Ipopt, watch: ca.Callback) -> ca.Function:
     """Return Ipopt on a relaxation with its own gradient and Hessian; takes the sharpness as its parameter."""
     x, p = ca.MX.sym("x", relax.value.size1_in(0)), ca.MX.sym("p")
-    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", 0)
     f = relax.value(x, p)
     gradient = ca.Function("nlp_grad_f", [x, p], [f, relax.gradient(x, p)], ["x", "p"], ["f", "grad_f_x"])
-    hessian = ca.Function(
-        "nlp_hess_l",
-        [x, p, lam_f, lam_g],
-        [ca.triu(lam_f * relax.hessian(x, p))],
-        ["x", "p", "lam_f", "lam_g"],
-        ["triu_hess_gamma_x_x"],
-    )
+    g, held = _equalities(relax, x, p)
     settings = {
         "print_time": False,
         "calc_lam_p": False,
         "no_nlp_grad": True,  # it would differentiate what has derivatives of its own
         "grad_f": gradient,
-        "hess_lag": hessian,
+        "hess_lag": _lagrangian(relax, x, p, g.numel()),
+        **held,
         "iteration_callback": watch,
         "ipopt": {
             "print_level": 0,
@@ -190,6 +204,27 @@ def nlpsol(relax: Relaxation, options: Ipopt, watch: ca.Callback) -> ca.Function
             "tol": options.tol,
             "max_iter": options.max_iter,
             **WARM,
+            **(EQUAL if relax.equalities else {}),
         },
     }
-    return ca.nlpsol("ipopt", "ipopt", {"x": x, "p": p, "f": f}, settings)
+    return ca.nlpsol("ipopt", "ipopt", {"x": x, "p": p, "f": f, "g": g}, settings)
+
+
+def _equalities(relax: Relaxation, x: ca.MX, p: ca.MX) -> tuple[ca.MX, dict[str, ca.Function]]:
+    """Return the constraints g (m, 1) that are to be zero, none perhaps, and the setting that differentiates them."""
+    if relax.equalities is None:
+        return ca.MX(0, 1), {}
+    g = relax.equalities.value(x)
+    jacobian = ca.Function("nlp_jac_g", [x, p], [g, relax.equalities.jacobian(x)], ["x", "p"], ["g", "jac_g_x"])
+    return g, {"jac_g": jacobian}
+
+
+def _lagrangian(relax: Relaxation, x: ca.MX, p: ca.MX, m: int) -> ca.Function:
+    """Return the upper triangle of the Hessian of the Lagrangian with m equalities."""
+    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)
+    if relax.equalities is None:
+        hessian = ca.triu(lam_f * relax.hessian(x, p))
+    else:
+        hessian = relax.equalities.hessian(x, p, lam_f, lam_g)
+    names = ["x", "p", "lam_f", "lam_g"]
+    return ca.Function("nlp_hess_l", [x, p, lam_f, lam_g], [hessian], names, ["triu_hess_gamma_x_x"])

@@ -1,0 +1,259 @@
+"""The full-space form: the placement's coordinates and every joint at every seam point are variables.
+
+Nothing is inverted: that each chain closes on the weld is an equality at every seam point, and joint limits are bounds.
+The problem is large but sparse, for seam points share nothing but the placement, so work grows in proportion to them.
+
+Variables are the placement's coordinates [m; rad], then seam point after seam point the joints of all stations in
+their order [rad], in DH direction. A positioner is the master: its joints follow from the seam alone and are none.
+
+Branches are no choice here: shoulder, elbow and wrist are the signs of the three factors of |det J|, which a descent
+inherits from its start. Changing one means to pass |det J| = 0, and the penalty under the singularity floor stands
+before that. It is a penalty at the seam's points, not a wall, so the exact model counts points on a wrong side.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from nlpweld.cell.cell import Cell
+from nlpweld.formulation.arrow import Arrow, arrow_relaxation
+from nlpweld.formulation.batch import Batch
+from nlpweld.formulation.holder import held
+from nlpweld.formulation.margins import with_margins
+from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
+from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, limit_margins, on_wrist, settle
+from nlpweld.formulation.seam_point import JOINTS, LEVER_M, SeamPoint, closure_function, facts_function, full_term
+from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps
+from nlpweld.formulation.stage import GAP_SCALE_M
+from nlpweld.geometry.seam import seam_parameters
+from nlpweld.kinematics.ik import ELBOW, SHOULDER, WRIST, signs
+from nlpweld.plan import Plan
+
+CONSTRAINTS = ("closure", "continuity", "branch", "joint_limit", "singularity", "clearance")
+CLOSED = 1e-7  # by how much a chain may be open at a point [m; rad]; a tenth of what the verifier allows
+HAIR = 1e-9  # by which bounds of joints lie inside their limits, so that rounding keeps the margin [rad]
+SCOUTS = 256  # random placements of which the best are started from
+NEAREST = 32  # scouts that tell which bodies come near each other
+SIDES = (SHOULDER, ELBOW, WRIST)
+
+
+def full(cell: Cell, engine: str = "auto") -> Nlp:
+    """Return the full-space form of a cell.
+
+    Args:
+        cell: the cell.
+        engine: ``numpy``, ``numba``, ``c`` or ``auto``, of the scouts; ``c`` compiles the derivatives too, all others
+            leave them to CasADi's own machine.
+
+    Raises:
+        KinematicsError: a robot has no closed-form inverse, which starts and |det J| need.
+    """
+    form = Full(Batch(cell, engine))
+    lower, upper = form.bounds
+    return Nlp(
+        problem=cell.name,
+        formulation="full",
+        names=form.names,
+        lower=lower,
+        upper=upper,
+        constraints=CONSTRAINTS,
+        evaluate=form.evaluate,
+        unpack=form.unpack,
+        relax=form.relax,
+        n_modes=len(form.batch.modes),
+        widened=lambda extra: full(with_margins(cell, extra), engine),
+        sample=form.starts,
+        prepare=form.prepare,
+    )
+
+
+def full_start(plan: Plan) -> np.ndarray:
+    """Return the variables (n,) of a plan of any solver; its points are taken to be its cell's."""
+    joints = np.hstack([plan.paths[station.name] for station in plan.cell.stations])
+    return np.concatenate([plan.cell.coordinates(plan.placement), joints.ravel()])
+
+
+@dataclass(frozen=True)
+class Full:
+    """What a full-space form is made of; S stations, N seam points.
+
+    Attributes:
+        batch: the exact model of the reduced form, which tells where placements are feasible.
+    """
+
+    batch: Batch
+
+    @property
+    def cell(self) -> Cell:
+        """The cell."""
+        return self.batch.cell
+
+    @cached_property
+    def point(self) -> SeamPoint:
+        """Expressions of one seam point."""
+        return SeamPoint(self.batch.stage)
+
+    @cached_property
+    def arrow(self) -> Arrow:
+        """How variables are ordered."""
+        return Arrow(len(self.cell.variables), self.point.own, self.batch.points)
+
+    @cached_property
+    def facts(self) -> ca.Function:
+        """What the exact model looks at, at one seam point."""
+        return facts_function(self.point, all_gaps(self.batch.stage))
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Bounds of all variables, shape (2, n): the placement's box, then joint limits less the solvers' margin."""
+        need = np.radians(self.cell.constraints.joint_margin_deg) + HAIR
+        limits = np.hstack([s.robot.limits_rad.T for s in self.cell.stations]) + np.array([[need], [-need]])
+        return np.concatenate([self.cell.box, np.tile(limits, self.arrow.points)], axis=1)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all variables."""
+        joints = [f"{s.name}.J{i + 1}" for s in self.cell.stations for i in range(JOINTS)]
+        return (*self.cell.variables, *(f"{name}[{j}]_rad" for j in range(self.arrow.points) for name in joints))
+
+    def prepare(self) -> None:
+        """Build and compile what ``evaluate`` and the scouts need."""
+        self.batch.prepare()
+        self.evaluate(self.bounds.mean(axis=0)[None])
+
+    def joints(self, Z: np.ndarray) -> np.ndarray:
+        """Return joint paths of candidates Z (m, n), shape (m, S, 6, N) [rad]."""
+        own = Z[:, self.arrow.shared :].reshape(len(Z), self.arrow.points, -1, JOINTS)
+        return own.transpose(0, 2, 3, 1)
+
+    def evaluate(self, Z: np.ndarray) -> Evaluation:
+        """Return objective, violations and mode of candidates Z, shape (m, n)."""
+        Z = np.atleast_2d(np.asarray(Z, dtype=float))
+        offset, turn, factors, w, mmr, gap = self._judged(Z)
+        levels, q = self.cell.constraints, self.joints(Z)
+        open_by = np.maximum(offset / LEVER_M, turn).max(axis=(1, 2))
+        floor, margin = levels.floor_at_points_m3, np.radians(levels.joint_margin_deg)
+        step, limit = self._path(q)
+        missed = {
+            "closure": open_by - CLOSED,
+            "continuity": (step - np.pi) / np.pi,
+            "branch": self._astray(factors),
+            "joint_limit": (margin - limit) / np.pi,
+            "singularity": (floor - w.min(axis=(1, 2))) / (floor or 1.0),
+            "clearance": (levels.clearance_at_points_m - gap.min(axis=(1, 2))) / GAP_SCALE_M,
+        }
+        mean = mmr.mean(axis=(1, 2))
+        violation = np.maximum(0.0, np.column_stack([missed[name] for name in CONSTRAINTS]))
+        return Evaluation(np.where(np.isfinite(mean), mean, -np.inf), violation, self._modes(factors))
+
+    def _judged(self, Z: np.ndarray) -> list[np.ndarray]:
+        """Return the facts of every candidate, each of shape (m, N, entries); factors station by station."""
+        m, n, d = len(Z), self.arrow.points, self.arrow.shared
+        Y = np.hstack([np.repeat(Z[:, :d], n, axis=0), Z[:, d:].reshape(m * n, -1)])
+        found = self.facts.map(m * n)(Y.T, np.tile(self.batch.points, m))
+        return [np.array(fact).T.reshape(m, n, -1) for fact in found]
+
+    def _settled(self, q: np.ndarray) -> np.ndarray:
+        """Return joint paths (m, S, 6, N), shifted by whole turns if they must, closed ones with their way back [rad].
+
+        A joint that winds once about a closed seam ends a turn away from where it began, which no bound of a variable
+        says. What is the same but for whole turns is one answer, so exact model and plan choose the turn alike.
+        """
+        if self.cell.seam.closed:
+            back = q[..., -1:] + (q[..., :1] - q[..., -1:] + np.pi) % (2 * np.pi) - np.pi
+            q = np.concatenate([q, back], axis=-1)
+        need = np.radians(self.cell.constraints.joint_margin_deg)
+        return np.stack([settle(s.robot, q[:, k], need) for k, s in enumerate(self.cell.stations)], axis=1)
+
+    def _path(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return longest step and least margin to a limit of joint paths, (m,) [rad], the way back included."""
+        settled = self._settled(q)
+        margins = [limit_margins(s.robot, settled[:, k]).min(axis=1) for k, s in enumerate(self.cell.stations)]
+        return np.abs(np.diff(settled, axis=-1)).max(axis=(1, 2, 3)), np.min(margins, axis=0)
+
+    def _astray(self, factors: np.ndarray) -> np.ndarray:
+        """Return the share of points with a robot on another side than at the first, or one not allowed, (m,)."""
+        side = self._sides(factors)
+        asked = side[:, :1].copy()
+        chosen = self.cell.configuration
+        for i, (name, all_) in enumerate(zip((chosen.shoulder, chosen.elbow, chosen.wrist), SIDES, strict=True)):
+            if name != "any":
+                asked[..., i] = all_[name]
+        return (side != asked).any(axis=(2, 3)).mean(axis=1)
+
+    def _sides(self, factors: np.ndarray) -> np.ndarray:
+        """Return the signs of shoulder, elbow and wrist, shape (m, N, S, 3)."""
+        return np.where(factors.reshape(*factors.shape[:2], -1, len(SIDES)) > 0.0, 1, -1)
+
+    def _branches(self, factors: np.ndarray) -> list[list[tuple[str, ...]]]:
+        """Return the names of the sides every station is on at the first point, for every candidate."""
+        named = [{sign: name for name, sign in side.items()} for side in SIDES]
+        first = self._sides(factors)[:, 0]
+        return [[tuple(n[int(i)] for n, i in zip(named, s, strict=True)) for s in stations] for stations in first]
+
+    def _modes(self, factors: np.ndarray) -> np.ndarray:
+        """Return which mode every candidate is on at its first point, (m,); 0 where that is none."""
+        modes = {mode: i for i, mode in enumerate(self.batch.modes)}
+        arms = [tuple((b[0], b[1]) for b in stations) for stations in self._branches(factors)]
+        return np.array([modes.get(arm, 0) for arm in arms])
+
+    def unpack(self, z: np.ndarray, mode: int) -> Plan:
+        """Return the plan of variables z (n,); its branches are those z is on, whatever the mode."""
+        cell, z = self.cell, np.asarray(z, dtype=float)
+        s, placement = seam_parameters(cell), cell.placement(z[: self.arrow.shared])
+        q = self._settled(self.joints(z[None]))[0, ..., : self.arrow.points]
+        paths = {station.name: q[k].T for k, station in enumerate(cell.stations)}
+        turned = held(cell, s).q
+        if cell.positioner and turned is not None:
+            paths[cell.positioner.name] = turned
+        found = self._branches(self._judged(z[None])[2])[0]
+        branches = {st.name: (b[0], b[1], b[2]) for st, b in zip(cell.stations, found, strict=True)}
+        return Plan(cell, placement[:3], s, paths, branches, float(placement[3]))
+
+    def starts(self, seed: int, count: int) -> np.ndarray:
+        """Return the best of some random placements, with joints by inverse kinematics on their best modes, (count, n).
+
+        Out of reach, arms point at their target, so that their chains are open.
+        """
+        X, found = self._scouted(seed, max(SCOUTS, count))
+        best = np.lexsort((-found.objective, found.total))[:count]
+        return np.array([self.start(X[i], int(found.mode[i])) for i in best])
+
+    def start(self, x: np.ndarray, mode: int) -> np.ndarray:
+        """Return variables (n,) of a placement (d,), with joints on a mode's branches."""
+        paths = [self._inverse(k, x, branch) for k, branch in enumerate(self.batch.modes[mode])]
+        return np.concatenate([x, np.concatenate(paths).T.ravel()])
+
+    def _scouted(self, seed: int, count: int) -> tuple[np.ndarray, Evaluation]:
+        X = sobol(self.cell.box[0], self.cell.box[1], seed, count)
+        return X, self.batch.evaluate(X)
+
+    def _inverse(self, k: int, x: np.ndarray, branch: tuple[str, str]) -> np.ndarray:
+        """Return station k's joint paths, shape (6, N) [rad].
+
+        They are unwrapped, on a wrist that keeps the joint margin if there is one, and as far inside the limits as
+        whole turns bring them.
+        """
+        n, robot, closed = self.arrow.points, self.cell.stations[k].robot, self.cell.seam.closed
+        side = np.reshape(signs((*branch, "noflip")), (3, 1))
+        out = self.batch.stage.grips[k].map(n)(np.tile(x[:, None], n), self.batch.points, np.tile(side, n))[0]
+        lanes = np.array(out).reshape(JOINTS, n, 2).transpose(2, 0, 1).reshape(2 * JOINTS, 1, n)
+        wrists, need = allowed(self.cell.configuration.wrist, WRIST), np.radians(self.cell.constraints.joint_margin_deg)
+        wrist = wrists[best_wrist(Limits.of(robot, closed), lanes, wrists, need)[1][0]]
+        return settle(robot, on_wrist(robot, joint_paths(robot, lanes, closed), wrist), np.inf)[0, :, :n]
+
+    def relax(self, mode: int, whole: bool = False) -> Relaxation:
+        """Return the relaxation, with every distance if whole, else with those that fall near at a mode's scouts."""
+        gaps = all_gaps(self.batch.stage) if whole else self._near(mode)
+        term = full_term(self.point, gaps, self.arrow.points)
+        return arrow_relaxation(term, closure_function(self.point), self.arrow, self.batch.chosen_engine)
+
+    def _near(self, mode: int, within_m: float = 0.2) -> Gaps:
+        """Return the distances that fall below a bound at the best scouts of a mode; all, if it has none."""
+        X, found = self._scouted(0, SCOUTS)
+        order = np.lexsort((-found.objective, found.total))
+        X = X[[i for i in order if np.isfinite(found.objective[i]) and found.mode[i] == mode][:NEAREST]]
+        stage = self.batch.stage
+        return near_gaps(stage, self.batch.modes[mode], X, self.batch.points, within_m) if len(X) else all_gaps(stage)

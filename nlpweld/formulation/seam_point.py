@@ -1,0 +1,164 @@
+"""One seam point in the full space: placement and every joint are given, and nothing is inverted."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+
+from nlpweld.formulation.coupling import WeldPoint, base_pose, placement_frame, tcp_pose, weld_point
+from nlpweld.formulation.smooth import Gaps
+from nlpweld.formulation.stage import GAP_SCALE_M, Stage
+from nlpweld.kinematics.chain import Chain, Frame, constant, rpy_pose
+from nlpweld.kinematics.ik import Solution, SphericalArm, spherical_arm
+from nlpweld.kinematics.manipulability import magnitude, mmr
+
+LEVER_M = 1.0  # a position error this long counts as much as a turn of one radian: about the arms' own length
+JOINTS = 6  # of every station: what has a closed-form manipulability
+
+
+@dataclass(frozen=True)
+class SeamPoint:
+    """Expressions of one seam point in its variables y: the placement's coordinates, then all stations' joints.
+
+    Attributes:
+        stage: the cell's graphs, without free angles.
+    """
+
+    stage: Stage
+
+    @property
+    def own(self) -> int:
+        """Number of joints of all stations."""
+        return JOINTS * len(self.stage.cell.stations)
+
+    @cached_property
+    def y(self) -> ca.SX:
+        """Variables, shape (d + own, 1) [m; rad]."""
+        return ca.SX.sym("y", len(self.stage.cell.variables) + self.own)
+
+    @cached_property
+    def weld(self) -> WeldPoint:
+        """What is known of the point."""
+        return weld_point(self.stage.cell)
+
+    @property
+    def inputs(self) -> list[ca.SX]:
+        """What every graph here takes: variables, and what is known of the point."""
+        return [self.y, self.weld.vector]
+
+    @property
+    def _x(self) -> ca.SX:
+        return self.y[: -self.own]
+
+    @cached_property
+    def cos_sin(self) -> list[tuple[ca.SX, ca.SX]]:
+        """Cosines and sines of every station's DH angles, shapes (6, 1)."""
+        joints = ca.vertsplit(self.y[-self.own :], JOINTS)
+        return [Chain(s.robot).cos_sin(q) for s, q in zip(self.stage.cell.stations, joints, strict=True)]
+
+    @cached_property
+    def errors(self) -> list[tuple[ca.SX, ca.SX]]:
+        """For every station how far its TCP is from where its coupling wants it: in W (3, 1) [m], and R_d^T R (3, 3).
+
+        R is the TCP's rotation and R_d the one asked for.
+        """
+        cell, found = self.stage.cell, []
+        T_W_C = placement_frame(cell, self._x) @ self.weld.T_P_C
+        for station, target, (cos, sin) in zip(cell.stations, self.weld.targets, self.cos_sin, strict=True):
+            flange = Chain(station.robot).links(cos, sin, base_pose(station))[-1]
+            is_ = flange @ constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
+            asked: Frame = tcp_pose(station.coupling, T_W_C, target)
+            found.append((is_.p - asked.p, asked.R.T @ is_.R))
+        return found
+
+    @cached_property
+    def factors(self) -> list[ca.SX]:
+        """For every station the signed factors of its manipulability: radius [m], elbow [m], sin(theta_5); (3, 1).
+
+        Their signs are shoulder, elbow and wrist of the branch (:mod:`~nlpweld.kinematics.ik`).
+        """
+        pairs = zip(self.stage.cell.stations, self.cos_sin, strict=True)
+        return [_factors(spherical_arm(station.robot), *cos_sin) for station, cos_sin in pairs]
+
+    @cached_property
+    def w(self) -> list[ca.SX]:
+        """Manipulability of every station [m^3]; its closed form in the joints."""
+        found = []
+        for station, (cos, sin), factors in zip(self.stage.cell.stations, self.cos_sin, self.factors, strict=True):
+            solution = Solution(cos, sin, ca.SX(1), factors[1], factors[0])
+            found.append(spherical_arm(station.robot).abs_det_jacobian(solution))
+        return found
+
+    @cached_property
+    def _limbs(self) -> list[tuple[ca.SX, ca.SX]]:
+        return [limbs(ca.horzcat(*cs)) for limbs, cs in zip(self.stage.limbs, self.cos_sin, strict=True)]
+
+    @property
+    def mmr(self) -> ca.SX:
+        """Multi-robot manipulability in the reading's unit."""
+        cell = self.stage.cell
+        return mmr(cell.objective.reading, self.w, [gram for gram, _ in self._limbs], cell.tight)
+
+    def gaps(self, which: Gaps) -> ca.SX:
+        """Return chosen distances between bodies and from the floor, one below the other [m]."""
+        ends = [*(ends for _, ends in self._limbs), self.stage.work(self._x, self.weld.vector)]
+        met = [self.stage.meetings[a, b](ends[a], ends[b])[list(i)] for (a, b), i in which.meetings.items()]
+        over = [h(own)[list(i)] for h, own, i in zip(self.stage.heights, ends, which.heights, strict=True)]
+        return ca.vertcat(*met, *over)
+
+
+def closure_function(point: SeamPoint) -> ca.Function:
+    """Return ``(y, point) ->`` six closure errors of every station, one below the other, all zero when it closes.
+
+    Three are the position error over :data:`LEVER_M`. Three are the axis of the remaining turn times the sine of its
+    angle, half of what R_d^T R differs from its transpose by: a polynomial in cosines and sines of the joints, regular
+    for turns below 90 degrees, but zero also at 180 degrees, which only the exact model tells apart.
+    """
+    rows = [ca.vertcat(offset / LEVER_M, sine_axis(turn)) for offset, turn in point.errors]
+    return ca.Function("closure", point.inputs, [ca.densify(ca.vertcat(*rows))], {"cse": True})
+
+
+def sine_axis(R: ca.SX) -> ca.SX:
+    """Return the axis of a rotation (3, 3) times the sine of its angle, shape (3, 1)."""
+    return ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]) / 2
+
+
+def full_term(point: SeamPoint, gaps: Gaps, n: int) -> ca.Function:
+    """Return ``(y, point, sharpness) ->`` what one of n seam points adds to the objective.
+
+    As in the reduced form (:func:`~.smooth.relaxation`), less the penalties for reach, which closure makes needless,
+    and for joint limits, which are bounds of variables.
+    """
+    cell, sharpness = point.stage.cell, ca.SX.sym("sharpness")
+    floor, level = cell.constraints.floor_at_points_m3, cell.constraints.clearance_at_points_m
+    kept = [w / (floor or 1.0) - float(floor > 0) for w in point.w]
+    penalty = _softened([*kept, (point.gaps(gaps) - level) / GAP_SCALE_M], sharpness)
+    term = penalty - point.mmr / magnitude(cell.objective.reading, cell.tight) / n
+    return ca.Function("term", [*point.inputs, sharpness], [term], {"cse": True})
+
+
+def facts_function(point: SeamPoint, gaps: Gaps) -> ca.Function:
+    """Return ``(y, point) -> offset (S), turn (S), factors (3, S), w (S), mmr, gap`` as the exact model judges them.
+
+    That is distance [m] and angle [rad] by which each of S chains is open, the factors and value of its
+    manipulability, the team's, and the least distance [m].
+    """
+    offset = [ca.norm_2(p) for p, _ in point.errors]
+    turn = [ca.atan2(ca.norm_2(sine_axis(R)), (ca.trace(R) - 1) / 2) for _, R in point.errors]
+    outputs = [ca.vertcat(*offset), ca.vertcat(*turn), ca.horzcat(*point.factors), ca.vertcat(*point.w), point.mmr]
+    outputs.append(ca.mmin(point.gaps(gaps)))
+    return ca.Function("facts", point.inputs, [ca.densify(out) for out in outputs], {"cse": True})
+
+
+def _factors(arm: SphericalArm, cos: ca.SX, sin: ca.SX) -> ca.SX:
+    """Return radius and elbow [m] and sin(theta_5), signed, from cosines and sines (6, 1), shape (3, 1)."""
+    s23, c23 = sin[1] * cos[2] + cos[1] * sin[2], cos[1] * cos[2] - sin[1] * sin[2]
+    radius = arm.a1 + arm.a2 * cos[1] + arm.a3 * c23 - arm.d4 * s23
+    return ca.vertcat(radius, arm.d4 * cos[2] + arm.a3 * sin[2], sin[4])
+
+
+def _softened(constraints: Iterable[ca.SX], sharpness: ca.SX) -> ca.SX:
+    """Return ``sum softplus(-sharpness * g) / sharpness`` over constraints g >= 0."""
+    missed = -sharpness * ca.vertcat(*constraints)
+    return ca.sum1(ca.fmax(missed, 0) + ca.log1p(ca.exp(-ca.fabs(missed)))) / sharpness
