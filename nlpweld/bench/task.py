@@ -129,6 +129,7 @@ def _record(task: Task, answer: Answer, wall_s: float) -> dict[str, Any]:
             }
             for step in outcome.trace
         ],
+        "sharpening": [{name: _number(v) for name, v in step.items()} for step in outcome.sharpening],
         "report": answer.report and answer.report.to_json(),
         "branches": answer.plan and answer.plan.branches,
     }

@@ -50,6 +50,8 @@ class Outcome:
         solve_s: time to solve [s].
         trace: progress, oldest first.
         message: the solver's own last word.
+        sharpening: of a solver with soft penalties, one entry for each solve: ``sharpness``, the ``smooth`` objective
+            it ended at, the ``exact`` one there, and how much the exact model misses (``missed``).
     """
 
     status: Status
@@ -61,6 +63,7 @@ class Outcome:
     solve_s: float
     trace: tuple[Step, ...] = ()
     message: str = ""
+    sharpening: tuple[dict[str, float], ...] = ()
 
 
 @runtime_checkable
@@ -86,6 +89,7 @@ class Incumbent:
     evaluations: int = 0
     started: float = field(default_factory=time.perf_counter)
     trace: list[Step] = field(default_factory=list)
+    sharpening: list[dict[str, float]] = field(default_factory=list)
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Evaluate candidates (m, n) and remember the best."""
@@ -122,6 +126,6 @@ class Incumbent:
         status: Status = "TIMEOUT" if message.startswith("time limit") else "SOLVED" if feasible else "INFEASIBLE"
         objective = self.objective if np.isfinite(self.objective) else float("nan")
         solve_s = self.elapsed_s - build_s
-        return Outcome(
-            status, self.x, self.mode, objective, self.evaluations, build_s, solve_s, tuple(self.trace), message
-        )
+        cost = self.evaluations, build_s, solve_s
+        told = tuple(self.trace), message, tuple(self.sharpening)
+        return Outcome(status, self.x, self.mode, objective, *cost, *told)

@@ -8,7 +8,7 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from nlpweld.formulation.nlp import Nlp, Relaxation
+from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation
 from nlpweld.solvers.base import Budget, Incumbent, Outcome
 
 # Each solve starts at the last one's answer, so the barrier of the box starts small and does not push it away.
@@ -132,6 +132,7 @@ class _Run:
             self.last = solver.stats()["return_status"]
             found = self.search.evaluate(np.clip(x, self.nlp.lower, self.nlp.upper)[None])
             self.search.note(x)
+            self.search.sharpening.append(_cost(float(solution["f"]), sharpness / self.options.growth, found))
             gain = float(found.objective[0]) - before
             before = float(found.objective[0])
             self.stopped = self.search.spent(self.budget)
@@ -156,6 +157,15 @@ class _Run:
             self.built[mode] = (nlpsol(relax, self.options, watch), watch, relax)
             self.build_s += time.perf_counter() - began
         return self.built[mode][0]
+
+
+def _cost(smooth: float, sharpness: float, found: Evaluation) -> dict[str, float]:
+    """Return what soft penalties of a sharpness cost: the smooth objective, to be maximised, against the exact one.
+
+    The smooth one counts MMR in a unit that keeps it of order one and takes the penalties off.
+    """
+    exact = {"exact": float(found.objective[0]), "missed": float(found.total[0])}
+    return {"sharpness": sharpness, "smooth": -smooth, **exact}
 
 
 class _Watch(ca.Callback):
