@@ -64,8 +64,8 @@ def test_random_search_is_worse_and_the_papers_placement_worse_still(nlp, three)
     assert nw.evaluate(three, three.placements["paper"]).mmr_mean < random < best
 
 
-def test_what_soft_penalties_cost_is_told_and_fades_as_they_sharpen(nlp: Nlp) -> None:
-    steps = solve(nlp, "ipopt", seed=0).outcome.sharpening
+def test_what_soft_penalties_cost_is_told_and_fades_as_they_sharpen(cell) -> None:
+    steps = nw.solve(nw.reduced(cell), "ipopt", seed=0).outcome.sharpening
     gaps = np.array([step["exact"] - step["smooth"] for step in steps])
     assert len(steps) >= 3
     assert (np.diff([step["sharpness"] for step in steps]) > 0).all()
