@@ -229,6 +229,6 @@ def test_default_grids_are_inside_the_bands_and_no_value_comes_twice() -> None:
     form = case("closed_yaw")[0]
     spin, yaw = lattice(form).grids
     assert len(spin) == len(yaw) == 36
-    assert len(np.unique(np.round(np.exp(1j * spin), 9))) == 24
+    assert len(np.unique(np.round(np.exp(1j * spin), 9))) == 36
     assert np.isclose(spin, 0.0).any()
     assert spread(-0.3, 0.2, 6) == pytest.approx([-0.3, -0.2, -0.1, 0.0, 0.1, 0.2])
