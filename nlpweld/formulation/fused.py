@@ -13,7 +13,7 @@ from nlpweld.cell.cell import Cell
 from nlpweld.engine.lanes import Kinds
 from nlpweld.engine.numba_kernels import INNER, JIT, kernel_source, load
 from nlpweld.formulation import candidate
-from nlpweld.formulation.candidate import Facts, Scratch
+from nlpweld.formulation.facts import Facts, Scratch
 from nlpweld.formulation.nlp import Evaluation
 from nlpweld.formulation.paths import allowed
 from nlpweld.formulation.stage import GAP_SCALE_M, Stage
