@@ -46,6 +46,8 @@ STEPS = (
     candidate.missed_by,
     candidate.judge,
 )
+# what is compiled is kept under its text, and knows the types it was given by name: so the text names them too
+TYPES = "".join(f"# {t.__module__}.{t.__name__}: {', '.join(t._fields)}\n" for t in (Facts, Scratch))
 HEAD = """from math import atan2, copysign, cos, floor, inf, isfinite, isnan, nan, pi, sin, sqrt
 
 import numba
@@ -149,7 +151,7 @@ def source(stage: Stage, n: int) -> str:
     kernels["work"] = stage.work, ("candidate", "point")
     kernels["gap"] = stage.gap, ("lane", "lane", "number")
     kernels["value"] = value_graph(stage.cell), ("lane", "lane")
-    parts = [HEAD.format(n=n, closed=stage.cell.seam.closed, near=NEAR, scale=GAP_SCALE_M)]
+    parts = [TYPES + HEAD.format(n=n, closed=stage.cell.seam.closed, near=NEAR, scale=GAP_SCALE_M)]
     parts += [INNER + kernel_source(f, kinds, n, name) for name, (f, kinds) in kernels.items()]
     stations = range(len(stage.grips))
     parts.append(_switch("grip", "x, points, signs, cos_sin, w, reach", stations))
