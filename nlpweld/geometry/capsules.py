@@ -3,6 +3,7 @@
 import casadi as ca
 
 TINY = 1e-12
+ROUNDED_M = 1e-7  # how near to zero a distance is rounded
 
 
 def segment_distance(
@@ -11,7 +12,8 @@ def segment_distance(
     """Return the distance between two segments [m].
 
     The nearest points on the two infinite lines are clamped to the segments, first on a, then on b, then on a
-    again, which is exact. Rounded within a micrometre of zero, so that crossing axes have a derivative.
+    again, which is exact. Rounded near zero, so that crossing axes have a derivative, and never above the truth: what
+    comes out is less than the distance by at most ``ROUNDED_M``.
 
     Args:
         start_a: one end of segment a, shape (3, 1) [m]; likewise end_a, start_b, end_b.
@@ -28,7 +30,7 @@ def segment_distance(
     t = _clamp((along * free + offset) / b)
     s = _clamp((along * t - across) / a)
     between = gap + s * u - t * v
-    return ca.sqrt(ca.dot(between, between) + TINY)
+    return ca.sqrt(ca.dot(between, between) + ROUNDED_M**2) - ROUNDED_M
 
 
 def _clamp(x: ca.SX) -> ca.SX:
