@@ -24,6 +24,8 @@ BY_HAND = {
     "harmonic": 40 / 7,  # 1 / (3/4 / 6 + 1/4 / 5)
     "sqrt_tight": 0.75 * 6**0.5 + 1.25,
     "millimetres": 4.5e18 + 1.25e9,
+    "product": 30.0,
+    "mean": 10 / 3,
 }
 
 
