@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from nlpweld.cell.cell import Cell
+from nlpweld.cell.cell import VARIABLES, Cell
 from nlpweld.cell.station import Station
 from nlpweld.cell.task import Grasp, Torch, TorchAngles
 from nlpweld.formulation.freedom import turn, turned_work
@@ -144,7 +144,7 @@ def moving_bodies(cell: Cell) -> list[int]:
 def placement_frame(cell: Cell, x: ca.SX) -> Frame:
     """Return T_W_P of free coordinates x (d, 1); those that are held are numbers."""
     whole = ca.SX(ca.DM(cell.search.bounds[0]))
-    free = [i for i, name in enumerate(("x_m", "y_m", "z_m", "yaw_rad")) if name in cell.variables]
+    free = [i for i, name in enumerate(VARIABLES) if name in cell.variables]
     whole[free] = x
     if 3 not in free and cell.search.bounds[0, 3] == 0.0:
         return Frame(constant(np.eye(4)).R, whole[:3])

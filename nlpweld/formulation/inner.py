@@ -92,7 +92,7 @@ def lattice(form: Redundant, grids: Mapping[str, np.ndarray] | None = None) -> L
     Args:
         form: the redundant form.
         grids: name of a free angle to its values [rad]. By default spins and yaws are spread over their bands, 72
-            values of one, 24 of each of two, 12 of each of more; tilts are held at 0.
+            values of one, 36 of each of two, 12 of each of more; tilts are held at 0.
     """
     wide = [angle for angle in form.coding.angles if angle.name.partition(".")[0] in ("spin", "yaw")]
     chosen = {angle.name: spread(angle.lower, angle.upper, COUNTS.get(len(wide), 12)) for angle in wide}

@@ -1,13 +1,12 @@
 """One seam point in the full space: placement and every joint are given, and nothing is inverted."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 
 from nlpweld.formulation.coupling import WeldPoint, base_pose, placement_frame, tcp_pose, weld_point
-from nlpweld.formulation.smooth import Gaps
+from nlpweld.formulation.smooth import Gaps, chosen_gaps, softened
 from nlpweld.formulation.stage import GAP_SCALE_M, Stage
 from nlpweld.kinematics.chain import Chain, Frame, constant, rpy_pose
 from nlpweld.kinematics.ik import Solution, SphericalArm, spherical_arm
@@ -103,9 +102,7 @@ class SeamPoint:
     def gaps(self, which: Gaps) -> ca.SX:
         """Return chosen distances between bodies and from the floor, one below the other [m]."""
         ends = [*(ends for _, ends in self._limbs), self.stage.work(self._x, self.weld.vector)]
-        met = [self.stage.meetings[a, b](ends[a], ends[b])[list(i)] for (a, b), i in which.meetings.items()]
-        over = [h(own)[list(i)] for h, own, i in zip(self.stage.heights, ends, which.heights, strict=True)]
-        return ca.vertcat(*met, *over)
+        return chosen_gaps(self.stage, which, ends)
 
 
 def closure_function(point: SeamPoint) -> ca.Function:
@@ -133,7 +130,7 @@ def full_term(point: SeamPoint, gaps: Gaps, n: int) -> ca.Function:
     cell, sharpness = point.stage.cell, ca.SX.sym("sharpness")
     floor, level = cell.constraints.floor_at_points_m3, cell.constraints.clearance_at_points_m
     kept = [w / (floor or 1.0) - float(floor > 0) for w in point.w]
-    penalty = _softened([*kept, (point.gaps(gaps) - level) / GAP_SCALE_M], sharpness)
+    penalty = softened([*kept, (point.gaps(gaps) - level) / GAP_SCALE_M], sharpness)
     term = penalty - point.mmr / magnitude(cell.objective.reading, cell.tight) / n
     return ca.Function("term", [*point.inputs, sharpness], [term], {"cse": True})
 
@@ -156,9 +153,3 @@ def _factors(arm: SphericalArm, cos: ca.SX, sin: ca.SX) -> ca.SX:
     s23, c23 = sin[1] * cos[2] + cos[1] * sin[2], cos[1] * cos[2] - sin[1] * sin[2]
     radius = arm.a1 + arm.a2 * cos[1] + arm.a3 * c23 - arm.d4 * s23
     return ca.vertcat(radius, arm.d4 * cos[2] + arm.a3 * sin[2], sin[4])
-
-
-def _softened(constraints: Iterable[ca.SX], sharpness: ca.SX) -> ca.SX:
-    """Return ``sum softplus(-sharpness * g) / sharpness`` over constraints g >= 0."""
-    missed = -sharpness * ca.vertcat(*constraints)
-    return ca.sum1(ca.fmax(missed, 0) + ca.log1p(ca.exp(-ca.fabs(missed)))) / sharpness

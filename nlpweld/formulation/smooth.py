@@ -1,5 +1,6 @@
 """The smooth side of the stage: MMR with soft penalties for collision, joint limits, singularity and reach."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -92,12 +93,10 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
     arms = [arm(x, point, _branch(b)) for arm, b in zip(stage.arms, mode, strict=True)]
     constraints = [g for k in range(len(arms)) for g in _robot_constraints(cell, k, arms[k])]
     ends = [*(arm[4] for arm in arms), stage.work(x, point)]
-    seen = [stage.meetings[a, b](ends[a], ends[b])[list(which)] for (a, b), which in gaps.meetings.items()]
-    seen += [h(own)[list(which)] for h, own, which in zip(stage.heights, ends, gaps.heights, strict=True)]
-    constraints.append((ca.vertcat(*seen) - cell.constraints.clearance_at_points_m) / GAP_SCALE_M)
+    constraints.append((chosen_gaps(stage, gaps, ends) - cell.constraints.clearance_at_points_m) / GAP_SCALE_M)
     tight, reading = cell.tight, cell.objective.reading
     value = mmr(reading, [a[1] for a in arms], [a[2] for a in arms], tight) / magnitude(reading, tight)
-    term = -value / n + ca.sum1(_softplus(-sharpness * ca.vertcat(*constraints))) / sharpness
+    term = -value / n + softened(constraints, sharpness)
     return ca.Function("term", [z, data, sharpness], [term], {"cse": True})
 
 
@@ -121,7 +120,7 @@ def step_function(stage: Stage, mode: Mode, bound: float) -> ca.Function:
     for grip, branch in zip(stage.grips, mode, strict=True):
         here, there = (grip(x, p, _branch(branch))[0] for p in (point, ca.vertcat(following, u)))
         gaps.append((ca.sum2(here * there) - np.cos(bound)) / (1 - np.cos(bound)))
-    penalty = STEP_WEIGHT * ca.sum1(_softplus(-sharpness * ca.vertcat(*gaps))) / sharpness
+    penalty = STEP_WEIGHT * softened(gaps, sharpness)
     inputs = [ca.vertcat(z, u), ca.vertcat(data, following), sharpness]
     return ca.Function("step", inputs, [penalty], {"cse": True})
 
@@ -166,5 +165,14 @@ def joint_constraints(robot: Robot, cos: ca.SX, sin: ca.SX, margin: float) -> li
     return constraints
 
 
-def _softplus(z: ca.SX) -> ca.SX:
-    return ca.fmax(z, 0) + ca.log1p(ca.exp(-ca.fabs(z)))
+def chosen_gaps(stage: Stage, gaps: Gaps, ends: Sequence[ca.SX]) -> ca.SX:
+    """Return chosen distances between bodies and from the floor, one below the other [m], from all owners' ends."""
+    met = [stage.meetings[a, b](ends[a], ends[b])[list(which)] for (a, b), which in gaps.meetings.items()]
+    over = [height(own)[list(which)] for height, own, which in zip(stage.heights, ends, gaps.heights, strict=True)]
+    return ca.vertcat(*met, *over)
+
+
+def softened(constraints: Iterable[ca.SX], sharpness: ca.SX) -> ca.SX:
+    """Return ``sum softplus(-sharpness * g) / sharpness`` over constraints g >= 0."""
+    missed = -sharpness * ca.vertcat(*constraints)
+    return ca.sum1(ca.fmax(missed, 0) + ca.log1p(ca.exp(-ca.fabs(missed)))) / sharpness
