@@ -65,7 +65,7 @@ def draw(table: pd.DataFrame, path: Path) -> None:
     """Draw time of an iteration, build time and peak memory over seam points."""
     from matplotlib import rc_context
 
-    from nlpweld.report.style import LINES, RC, SERIES, figure, name_axes
+    from nlpweld.report.style import LINES, RC, SERIES, figure, name_axes, plain_log
 
     panels = {"time_s": "one iteration (s)", "build_s": "build (s)", "peak_mb": "peak memory (MB)"}
     with rc_context(RC):
@@ -76,6 +76,9 @@ def draw(table: pd.DataFrame, path: Path) -> None:
                 style = {"color": SERIES[k], "linestyle": LINES[k], "marker": "osv^"[k], "markersize": 3}
                 ax.loglog(part["size"], part[column], label=form, **style)
             name_axes(ax, "seam points" if column == "peak_mb" else "", label)
+            plain_log(ax.yaxis)
+        plain_log(axes[-1].xaxis)
+        axes[-1].set_xticks(sorted(table["size"].unique()))
         fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
         path.parent.mkdir(parents=True, exist_ok=True)
         fig.savefig(path)
