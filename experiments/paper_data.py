@@ -1,7 +1,6 @@
 """Data behind the figures of Pan et al.: seam, profiles, arms and ellipsoids, and the solvers' paths, as tables."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,7 +9,8 @@ from nlpweld.cell import Cell, Station
 from nlpweld.formulation.nlp import Evaluation, Nlp
 from nlpweld.geometry.seam import weld_frames
 from nlpweld.plan import Plan
-from nlpweld.report.records import AXES
+from nlpweld.records.frames import AXES
+from nlpweld.records.model import Record
 from nlpweld.solvers import Budget, make_solver
 from nlpweld.verify import Report, reference
 
@@ -101,13 +101,13 @@ def ga_individuals(nlp: Nlp, seed: int, budget: Budget) -> pd.DataFrame:
     return table[["generation", *AXES, "mmr", "feasible"]]
 
 
-def ipopt_path(records: list[dict[str, Any]], optimum: np.ndarray) -> pd.DataFrame:
+def ipopt_path(records: list[Record], optimum: np.ndarray) -> pd.DataFrame:
     """Return Ipopt's iterates in the verified run with the shortest trace among those that start far away.
 
     Columns: seed, iteration, x_m, y_m, z_m; empty without a verified run.
     """
-    good = [r for r in records if r["verified"] and r["trace"]]
-    paths = [(r["seed"], np.array([[step["placement"][a] for a in AXES] for step in r["trace"]])) for r in good]
+    good = [r for r in records if r.verified and r.trace.time_s]
+    paths = [(r.seed, np.array([r.trace.placement[a] for a in AXES]).T) for r in good]
     far = [p for p in paths if np.linalg.norm(p[1][0] - optimum) > FAR_M] or paths
     if not far:
         return pd.DataFrame(columns=["seed", "iteration", *AXES])

@@ -16,7 +16,7 @@ from nlpweld.formulation.nlp import Nlp
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs
 from nlpweld.kinematics.manipulability import mmr
-from nlpweld.report.records import AXES
+from nlpweld.records.frames import AXES
 
 Badness = Callable[[np.ndarray, np.ndarray], np.ndarray]
 ROUNDS, BROOD = 14, 31  # of the local search that follows the scan

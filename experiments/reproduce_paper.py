@@ -5,32 +5,32 @@
 What the folder already holds is not run again.
 """
 
-import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator
+from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from common import Step, main, solved, work
 from paper_data import arm_table, ellipsoid_table, ga_individuals, ipopt_path, profile_table, seam_table, welder
 from paper_search import Profiles, near_singular, slice_map, unsteady, without_floor, worst_placements
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from nlpweld.bench.answer import evaluate_plan, with_branches
-from nlpweld.bench.run import grid, run
-from nlpweld.bench.task import Task
+from nlpweld.bench.progress import StudyProgress
 from nlpweld.cell import Cell, load_cell
 from nlpweld.errors import NlpweldError
 from nlpweld.formulation.nlp import Nlp
 from nlpweld.formulation.reduced import reduced
 from nlpweld.plan import Plan, write_text
+from nlpweld.records.frames import AXES
+from nlpweld.records.model import Record
 from nlpweld.report.plots import write_plots
-from nlpweld.report.records import AXES
-from nlpweld.report.tables import format_summary, write_tables
+from nlpweld.report.tables import write_tables
 from nlpweld.solvers import Budget
 from nlpweld.verify import Report, verify
 
@@ -38,8 +38,6 @@ CELL, ANY = "three_er16", "three_er16-any"
 PAPER = "Pan et al. C"
 MAPS = {"": np.inf, "near_": 0.22}  # whole slices of S, and what is within so many metres of the optimum
 ELLIPSOID_POINT = 0  # the seam point of Fig. 3
-Record = dict[str, Any]
-Step = tuple[str, Callable[[], None]]
 
 
 @dataclass(frozen=True)
@@ -47,32 +45,18 @@ class Size:
     """How much of the study is done.
 
     Attributes:
-        seeds: by solver (``any `` before those of the cell with all branches), how many.
-        evaluations: budget of each population run.
+        evaluations: budget of the population run whose individuals are drawn.
         map_points: grid points along each side of a map.
         scan: candidates of the scans for poor placements.
     """
 
-    seeds: dict[str, int]
     evaluations: int
     map_points: int
     scan: int
 
 
-RUNS = {"ipopt": 20, "ipopt:plain": 20, "ga": 10, "ga:paper": 10, "random_search": 10, "any ipopt": 3, "any ga": 2}
-FULL = Size(RUNS, 5000, 80, 4096)
-QUICK = Size({"ipopt:plain": 1, "ga": 2, "ga:paper": 1, "random_search": 1, "any ga": 1}, 600, 12, 256)
-
-
-def tasks(cell: Cell, size: Size) -> list[Task]:
-    """Return the runs of the study."""
-    found: list[Task] = []
-    for name, seeds in size.seeds.items():
-        solver = name.removeprefix("any ")
-        budget = Budget(time_s=300.0, evaluations=None if solver.startswith("ipopt") else size.evaluations)
-        own, label = (cell, CELL) if name == solver else (with_branches(cell, "any"), ANY)
-        found += grid([own], [solver], range(seeds), budget=budget, label=label)
-    return found
+FULL = Size(5000, 80, 4096)
+QUICK = Size(600, 12, 256)
 
 
 @dataclass(frozen=True)
@@ -103,8 +87,8 @@ class Data:
         yield "poor placements", self._poor
 
     def _best(self, label: str) -> Record | None:
-        good = [r for r in self.records if r["cell"] == label and r["verified"]]
-        return max(good, key=lambda r: r["report"]["mmr_mean"], default=None)
+        good = [r for r in self.records if r.cell == label and r.verified and r.report]
+        return max(good, key=lambda r: (r.report or {})["mmr_mean"], default=None)
 
     def _paper(self, nlp: Nlp, at: np.ndarray, label: str) -> None:
         plan, report = evaluate_plan(nlp, at)
@@ -123,10 +107,10 @@ class Data:
             self._csv("ellipsoids", ellipsoid_table(plan, report, ELLIPSOID_POINT))
 
     def _paths(self, nlp: Nlp, optimum: np.ndarray) -> None:
-        own = [r for r in self.records if r["cell"] == CELL]
-        seed = median_seed([r for r in own if r["solver"] == "ga" and r["preset"] == "default"])
+        own = [r for r in self.records if r.cell == CELL]
+        seed = median_seed([r for r in own if r.solver == "ga" and r.preset == "default"])
         self._csv("ga_individuals", ga_individuals(nlp, seed, Budget(self.size.evaluations)).assign(seed=seed))
-        self._csv("ipopt_path", ipopt_path([r for r in own if r["preset"] == "plain"], optimum))
+        self._csv("ipopt_path", ipopt_path([r for r in own if r.preset == "plain"], optimum))
 
     def _map(self, nlp: Nlp, optimum: np.ndarray, axis: int) -> None:
         for kind, within_m in MAPS.items():
@@ -160,63 +144,28 @@ class Data:
 
 
 def _placement(record: Record) -> np.ndarray:
-    return np.array([record["placement"][name] for name in AXES])
+    assert record.placement is not None
+    return np.array([record.placement[name] for name in AXES])
 
 
 def median_seed(records: list[Record]) -> int:
     """Return the seed of the run whose best MMR is the (lower) median of its kind."""
-    ranked = sorted(records, key=lambda r: (r.get("claimed_objective") or -np.inf, r["seed"]))
-    return int(ranked[(len(ranked) - 1) // 2]["seed"])
+    ranked = sorted(records, key=lambda r: (r.claimed_objective or -np.inf, r.seed))
+    return ranked[(len(ranked) - 1) // 2].seed
 
 
-def reproduce(folder: Path, workers: int, size: Size, console: Console, figures: bool = True) -> pd.DataFrame:
+def reproduce(options: Namespace, console: Console) -> pd.DataFrame:
     """Do the whole study in a folder and return the summary table."""
-    cell = load_cell(CELL)
-    todo = tasks(cell, size)
-    columns = (TextColumn("{task.description:<34}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress:
-        bar = progress.add_task("solving", total=len(todo))
-
-        def told(record: Record, known: bool) -> None:
-            what = f"{record['solver']}:{record['preset']} seed {record['seed']}"
-            progress.update(bar, advance=1, description=f"{what} {'known' if known else record['status']}")
-
-        records = run(todo, folder, workers, told)
-        progress.update(bar, description="runs")
+    cell, folder, size = load_cell(CELL), options.out, QUICK if options.quick else FULL
+    with StudyProgress(console) as watch:
+        records = solved("paper_quick" if options.quick else "paper", folder, options.workers, watch)
         steps = list(Data(folder, cell, size, records).steps())
-        bar = progress.add_task("figure data", total=len(steps) + 2)
-        for name, work in steps:
-            progress.update(bar, description=name)
-            work()
-            progress.advance(bar)
-        progress.update(bar, description="tables")
-        table = write_tables(folder)
-        progress.update(bar, advance=1, description="figures")
-        if figures:
-            write_plots(folder, progress.console.print)
-        progress.update(bar, advance=1, description="data, tables, figures")
-    return table
-
-
-def main() -> int:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("results/paper"), help="folder of the study")
-    parser.add_argument("--workers", type=int, default=2, help="runs at once")
-    parser.add_argument("--quick", action="store_true", help="few seeds, coarse maps: to see that it works")
-    parser.add_argument("--no-figures", action="store_true", help="stop after data and tables")
-    options = parser.parse_args()
-    console = Console(width=None if sys.stdout.isatty() else 100)
-    try:
-        size = QUICK if options.quick else FULL
-        table = reproduce(options.out, options.workers, size, console, not options.no_figures)
-    except NlpweldError as error:
-        print(error, file=sys.stderr)
-        return 2
-    console.print(format_summary(table, console.width))
-    console.print(f"tables, figures, plans and records: {options.out}")
-    return 0
+        steps.append(("tables", lambda: write_tables(folder)))
+        if not options.no_figures:
+            steps.append(("figures", lambda: write_plots(folder, watch.bar.console.print)))
+        work(steps, watch, "data, tables, figures")
+    return write_tables(folder)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(reproduce, __doc__, "results/paper"))

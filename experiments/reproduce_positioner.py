@@ -5,10 +5,10 @@
 What the folder already holds is not run again.
 """
 
-import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator
+from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,24 +16,22 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from common import Step, main, solved, work
 from positioner_data import along, at_breaks, dense, dense_plan, frame_table, weld_position_table
 from positioner_search import box_grid, placement_map, sampled_optimum
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from nlpweld.bench.answer import evaluate_plan
-from nlpweld.bench.run import grid, run
-from nlpweld.bench.task import Task
+from nlpweld.bench.progress import StudyProgress
 from nlpweld.cell import Cell, load_cell
-from nlpweld.errors import NlpweldError
 from nlpweld.formulation.nlp import Nlp
 from nlpweld.formulation.reduced import reduced
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.plan import write_text
+from nlpweld.records.frames import AXES
+from nlpweld.records.model import Record
 from nlpweld.report.plots import write_plots
-from nlpweld.report.records import AXES
-from nlpweld.report.tables import format_summary, write_tables
-from nlpweld.solvers import Budget
+from nlpweld.report.tables import write_tables
 from nlpweld.verify import Report
 
 DUAL, SINGLE = "dual_welder_positioner", "robot_positioner"
@@ -41,8 +39,6 @@ BASELINES = {DUAL: {name: f"Zhang et al. {name}" for name in "ABCD"}, SINGLE: {"
 WATCHED = "robot_2"  # whose joint speeds Zhang et al. show in Fig. 9
 NEAR_M, NEAR_POINTS = 0.05, 41  # half a side of the map near the optimum, at least, and points along a side
 NOTE = "best of a grid, polished from its best few points: sampled, not a rigorous bound"
-Record = dict[str, Any]
-Step = tuple[str, Callable[[], object]]
 Shared = dict[str, list[pd.DataFrame]]
 
 
@@ -51,32 +47,18 @@ class Size:
     """How much of the study is done.
 
     Attributes:
-        seeds: by solver, how many.
-        evaluations: budget of each population run.
         grid_m: step of the grid behind the reference optimum.
         map_m: step of the maps over the whole box.
         dense: seam points where speeds are taken.
     """
 
-    seeds: dict[str, int]
-    evaluations: int
     grid_m: float
     map_m: float
     dense: int
 
 
-# A population of 50 for 40 generations is ample for two variables: the paper cell's 100 generations are for three.
-FULL = Size(dict.fromkeys(("ipopt", "ipopt:plain", "ga", "ga:paper", "random_search"), 5), 2000, 0.01, 0.02, 721)
-QUICK = Size({"ipopt:plain": 1, "ga": 1, "random_search": 1}, 200, 0.1, 0.1, 145)
-
-
-def tasks(cells: list[Cell], size: Size) -> list[Task]:
-    """Return the runs of the study."""
-    found: list[Task] = []
-    for solver, seeds in size.seeds.items():
-        evaluations = None if solver.startswith("ipopt") else size.evaluations
-        found += grid(cells, [solver], range(seeds), budget=Budget(time_s=300.0, evaluations=evaluations))
-    return found
+FULL = Size(0.01, 0.02, 721)
+QUICK = Size(0.1, 0.1, 145)
 
 
 @dataclass(frozen=True)
@@ -129,7 +111,7 @@ class OneCell:
 
     def _near(self, x: np.ndarray) -> np.ndarray:
         """Return a grid about the reference, wide enough for every verified answer of the solvers."""
-        own = [r["placement"] for r in self.records if r["cell"] == self.cell.name and r["verified"]]
+        own = [r.placement for r in self.records if r.cell == self.cell.name and r.verified and r.placement]
         answers = np.array([[place[name] for name in self.nlp.names] for place in own] or [x])
         half = max(1.1 * np.abs(answers - x).max(), NEAR_M)
         low, high = np.maximum(x - half, self.nlp.lower), np.minimum(x + half, self.nlp.upper)
@@ -171,58 +153,19 @@ def gather(folder: Path, shared: Shared) -> None:
         csv(folder, name, pd.concat(parts, ignore_index=True), digits=12)
 
 
-def reproduce(folder: Path, workers: int, size: Size, console: Console, figures: bool = True) -> pd.DataFrame:
+def reproduce(options: Namespace, console: Console) -> pd.DataFrame:
     """Do the whole study in a folder and return the summary table."""
-    cells = [load_cell(name) for name in BASELINES]
-    columns = (TextColumn("{task.description:<46}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress:
-        records = solved(tasks(cells, size), folder, workers, progress)
+    cells, folder, size = [load_cell(name) for name in BASELINES], options.out, QUICK if options.quick else FULL
+    with StudyProgress(console) as watch:
+        records = solved("positioner_quick" if options.quick else "positioner", folder, options.workers, watch)
         shared: Shared = {}
         steps = [step for cell in cells for step in OneCell(folder, cell, size, records, shared).steps()]
-        steps += [("shared tables", lambda: gather(folder, shared)), ("summary", lambda: write_tables(folder))]
-        if figures:
+        steps += [("shared tables", lambda: gather(folder, shared)), ("tables", lambda: write_tables(folder))]
+        if not options.no_figures:
             steps.append(("figures", lambda: write_plots(folder)))
-        bar = progress.add_task("figure data", total=len(steps))
-        for name, work in steps:
-            progress.update(bar, description=name)
-            work()
-            progress.advance(bar)
-        progress.update(bar, description="data, tables, figures")
+        work(steps, watch, "data, tables, figures")
     return write_tables(folder)
 
 
-def solved(todo: list[Task], folder: Path, workers: int, progress: Progress) -> list[Record]:
-    """Run what the folder does not hold yet and return all records."""
-    bar = progress.add_task("solving", total=len(todo))
-
-    def told(record: Record, known: bool) -> None:
-        what = f"{record['cell']}: {record['solver']}:{record['preset']} {record['seed']}"
-        progress.update(bar, advance=1, description=f"{what} {'known' if known else record['status']}")
-
-    records = run(todo, folder, workers, told)
-    progress.update(bar, description="runs")
-    return records
-
-
-def main() -> int:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("results/positioner"), help="folder of the study")
-    parser.add_argument("--workers", type=int, default=2, help="runs at once")
-    parser.add_argument("--quick", action="store_true", help="few seeds, coarse grids: to see that it works")
-    parser.add_argument("--no-figures", action="store_true", help="stop after data and tables")
-    options = parser.parse_args()
-    console = Console(width=None if sys.stdout.isatty() else 100)
-    try:
-        size = QUICK if options.quick else FULL
-        table = reproduce(options.out, options.workers, size, console, not options.no_figures)
-    except NlpweldError as error:
-        print(error, file=sys.stderr)
-        return 2
-    console.print(format_summary(table, console.width))
-    console.print(f"tables, figures, plans and records: {options.out}")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(reproduce, __doc__, "results/positioner"))

@@ -18,6 +18,7 @@ from nlpweld.errors import OutputError, PlanError
 
 FORMAT = "nlpweld-plan"
 VERSION = 1
+WRITING = ".writing-"  # how names of files begin that are not whole yet
 TILTS = ("slope", "rotation")
 BRANCHES = tuple(product(("front", "back"), ("up", "down"), ("noflip", "flip")))
 
@@ -225,13 +226,22 @@ def write_text(path: str | Path, text: str) -> Path:
     Raises:
         OutputError: the folder or file cannot be written.
     """
+    return write_bytes(path, text.encode())
+
+
+def write_bytes(path: str | Path, data: bytes) -> Path:
+    """Write a file by way of a temporary name beside it, so that it is whole or absent.
+
+    Raises:
+        OutputError: the folder or file cannot be written.
+    """
     path = Path(path)
     temporary = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False, encoding="utf-8") as file:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=WRITING, delete=False) as file:
             temporary = file.name
-            file.write(text)
+            file.write(data)
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
     except OSError as error:

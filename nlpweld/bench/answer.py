@@ -58,9 +58,18 @@ def formulate(cell: Cell, formulation: str = "reduced", engine: str = "auto") ->
     Raises:
         OptionError: no such formulation or engine; lists those there are.
     """
-    if formulation not in FORMULATIONS:
-        raise OptionError(f"formulation '{formulation}' is unknown. There are: {', '.join(FORMULATIONS)}")
-    return FORMULATIONS[formulation](cell, engine)
+    return FORMULATIONS[known_formulation(formulation)](cell, engine)
+
+
+def known_formulation(name: str) -> str:
+    """Return a formulation's name if there is one of that name.
+
+    Raises:
+        OptionError: there is none; lists those there are.
+    """
+    if name not in FORMULATIONS:
+        raise OptionError(f"formulation '{name}' is unknown. There are: {', '.join(FORMULATIONS)}")
+    return name
 
 
 def with_branches(cell: Cell, branches: str | None) -> Cell:
@@ -192,5 +201,6 @@ def _after(first: Answer, second: Answer, round_: int) -> Answer:
         solve_s=a.solve_s + b.solve_s,
         message=f"{b.message}; margins grown {round_} times",
         trace=a.trace + b.trace,
+        improvements=b.improvements,  # of the first round were feasible under margins that did not suffice
     )
     return Answer(outcome, plan, second.report)

@@ -3,14 +3,22 @@
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from nlpweld.bench.run import Progress, grid, run
+from nlpweld.bench.engines import engine_of
+from nlpweld.bench.run import Watcher, grid, run
 from nlpweld.cell import Cell
+from nlpweld.records.model import Record
 from nlpweld.solvers import Budget
 
 if TYPE_CHECKING:
     import pandas as pd
+
+COLUMNS = (
+    "cell", "formulation", "solver", "preset", "seed", "status", "verified", "mmr_mean", "claimed_objective",
+    "evaluations", "build_s", "solve_s",
+)  # fmt: skip
+PLACED = ("x_m", "y_m", "z_m", "yaw_rad")
 
 
 def compare(
@@ -22,7 +30,8 @@ def compare(
     budget: Budget | None = None,
     out: str | Path | None = None,
     workers: int = 1,
-    progress: Progress | None = None,
+    scheduler: str | None = None,
+    watch: Watcher | None = None,
 ) -> "pd.DataFrame":
     """Run every solver on every cell for every seed, verify each answer, and return one row a run.
 
@@ -33,35 +42,27 @@ def compare(
         formulations: names of formulations.
         budget: limits of each run.
         out: folder of the study, which resumes what it already holds; without one, records are not kept.
-        workers: runs under way at once.
-        progress: called with each record and whether it was already there.
+        workers: runs under way at once; runtime tables want one.
+        scheduler: address of a Dask scheduler that has the workers instead, or ``local``.
+        watch: told of each record as it arrives.
 
     Raises:
-        OptionError: an unknown solver or preset.
+        OptionError: an unknown solver or preset, or no scheduler there.
         OutputError: the folder cannot be written.
     """
-    import pandas as pd
-
     several = [cells] if isinstance(cells, Cell) else list(cells)
     tasks = grid(several, solvers, range(seeds) if isinstance(seeds, int) else seeds, formulations, budget)
+    engine = engine_of(workers, scheduler)
     if out is not None:
-        return pd.DataFrame([row(r) for r in run(tasks, Path(out), workers, progress)])
+        return table(run(tasks, Path(out), engine, watch))
     with tempfile.TemporaryDirectory() as folder:
-        return pd.DataFrame([row(r) for r in run(tasks, Path(folder), workers, progress)])
+        return table(run(tasks, Path(folder), engine, watch))
 
 
-def row(record: dict[str, Any]) -> dict[str, Any]:
-    """Return the row of one record; MMR is the verifier's, and only of verified answers."""
-    report = record.get("report") or {}
-    head = {key: record[key] for key in ("cell", "formulation", "solver", "preset", "seed", "status", "verified")}
-    place = record.get("placement") or {}
-    return {
-        **head,
-        "mmr_mean": report.get("mmr_mean") if record["verified"] else None,
-        "claimed_objective": record.get("claimed_objective"),
-        **place,
-        "evaluations": record.get("evaluations"),
-        "build_s": record.get("build_s"),
-        "solve_s": record.get("solve_s"),
-        "message": record["message"],
-    }
+def table(records: Iterable[Record]) -> "pd.DataFrame":
+    """Return one row a run; MMR is the verifier's, and only of verified answers."""
+    from nlpweld.records.frames import runs_frame
+
+    found = runs_frame(records)
+    found["mmr_mean"] = found["mmr_mean"].where(found["verified"])
+    return found[[*COLUMNS, *(name for name in found.columns if name.endswith(PLACED)), "message"]]

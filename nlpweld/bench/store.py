@@ -1,12 +1,19 @@
-"""The folder of a study: one JSON record per task, written whole or not at all, skipped when its key matches."""
+"""The folder of a study: one record per task, skipped when its key matches, and one runner at a time."""
 
-import json
+import contextlib
+import os
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-from nlpweld.bench.task import RECORD_VERSION, Task
+from filelock import FileLock, Timeout
+
+from nlpweld.bench.task import Task
 from nlpweld.errors import OutputError
-from nlpweld.plan import write_text
+from nlpweld.plan import WRITING, write_text
+from nlpweld.records import files
+from nlpweld.records.model import Record
+
+LOCK, OWNER = ".lock", ".owner"
 
 
 def record_path(folder: Path, task: Task) -> Path:
@@ -14,37 +21,56 @@ def record_path(folder: Path, task: Task) -> Path:
     return folder / "records" / f"{task.place}.json"
 
 
-def known_record(folder: Path, task: Task) -> dict[str, Any] | None:
-    """Return the stored record of this very task, or None when there is none with its key."""
+def known_record(folder: Path, task: Task) -> Record | None:
+    """Return the stored record of this very task, or None when there is none with its key.
+
+    Raises:
+        OutputError: there is a record that was edited, cut, or comes from a newer version.
+    """
     path = record_path(folder, task)
     if not path.is_file():
         return None
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError:
-        return None
-    same = isinstance(record, dict) and record.get("key") == task.key and record.get("version") == RECORD_VERSION
-    return record if same and record.get("status") != "FAILED" else None
+    record = files.read_record(path)
+    return record if record.key == task.key else None
 
 
-def write_record(folder: Path, task: Task, record: dict[str, Any]) -> Path:
+def write_record(folder: Path, task: Task, record: Record) -> Path:
     """Write the record of a task.
 
     Raises:
         OutputError: the file cannot be written.
     """
-    return write_text(record_path(folder, task), json.dumps(record, indent=1) + "\n")
+    return files.write_record(record_path(folder, task), record)
 
 
-def ready(folder: Path) -> None:
-    """Make sure that records can be written below a folder.
+@contextlib.contextmanager
+def owned(folder: Path) -> Iterator[None]:
+    """Hold a folder for one runner; the system lets go of it however the runner ends.
 
     Raises:
-        OutputError: they cannot; says why.
+        OutputError: the folder cannot be written, or another runner is at work in it.
     """
-    probe = folder / "records" / ".probe"
-    write_text(probe, "")
+    records = folder / "records"
+    lock = FileLock(records / LOCK, timeout=0)
     try:
-        probe.unlink()
+        write_text(records / ".probe", "").unlink()
+        lock.acquire()
+    except Timeout:
+        raise OutputError(f"{folder}: another run ({_owner(records)}) is writing here; wait for it or choose another "
+                          "--out") from None  # fmt: skip
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error.strerror}); choose another --out") from None
+    try:
+        write_text(records / OWNER, f"process {os.getpid()}\n")
+        for left in records.rglob(f"{WRITING}*"):  # by a runner that was killed while it wrote
+            left.unlink(missing_ok=True)
+        yield
+    finally:
+        lock.release()
+
+
+def _owner(records: Path) -> str:
+    try:
+        return (records / OWNER).read_text(encoding="utf-8").strip()
+    except OSError:
+        return "of an unknown process"

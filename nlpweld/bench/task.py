@@ -2,8 +2,10 @@
 
 import hashlib
 import json
+import os
 import platform
 import time
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from typing import Any
@@ -11,12 +13,15 @@ from typing import Any
 import numpy as np
 
 from nlpweld.bench.answer import Answer, formulate, solve
+from nlpweld.bench.held import held_answers
 from nlpweld.cell.cell import VARIABLES, Cell
 from nlpweld.errors import NlpweldError
+from nlpweld.records.model import VERSION, Record, Trace
 from nlpweld.solvers import Budget, presets
+from nlpweld.solvers.base import Step
 
-RECORD_VERSION = 2
 PACKAGES = ("nlpweld", "casadi", "numpy", "scipy", "pymoo", "python-fcl")
+DIGITS = 6  # of times and coordinates in a trace
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +36,9 @@ class Task:
         formulation: name of the formulation.
         budget: limits.
         label: name of the cell's folder, where it differs from the cell's name (e.g. other branches).
+        options: single options of the solver, on top of the preset.
+        variant: name for the preset with these options; needed where there are any.
+        limit_mb: memory the run may take, or None.
     """
 
     cell: Cell
@@ -40,29 +48,40 @@ class Task:
     formulation: str = "reduced"
     budget: Budget = field(default_factory=Budget)
     label: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    variant: str = ""
+    limit_mb: int | None = None
+
+    @property
+    def chosen(self) -> dict[str, Any]:
+        """Options of the solver that differ from its own defaults."""
+        return {**presets(self.solver)[self.preset], **self.options}
 
     @property
     def key(self) -> str:
-        """Hash of all that decides the answer: cell, formulation, options, seed, budget and record version."""
+        """Hash of all that decides the answer: cell, formulation, options, seed, limits and record version."""
         decisive = [
-            RECORD_VERSION,
+            VERSION,
             self.cell.content_hash,
             self.formulation,
             self.solver,
-            presets(self.solver)[self.preset],
+            self.chosen,
             self.seed,
             asdict(self.budget),
+            self.limit_mb,
         ]
         return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
     @property
     def place(self) -> str:
         """Path of the record below ``records/``, without its ending."""
-        return f"{self.label or self.cell.name}/{self.formulation}/{self.solver}-{self.preset}/seed{self.seed:03d}"
+        contestant = f"{self.solver}-{self.variant or self.preset}"
+        return f"{self.label or self.cell.name}/{self.formulation}/{contestant}/seed{self.seed:03d}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the task as plain data, for another process."""
-        data = {name: getattr(self, name) for name in ("solver", "seed", "preset", "formulation", "label")}
+        names = ("solver", "seed", "preset", "formulation", "label", "variant", "limit_mb")
+        data = {name: getattr(self, name) for name in names} | {"options": dict(self.options)}
         return {**data, "budget": asdict(self.budget), "cell": self.cell.model_dump(mode="json", exclude_unset=True)}
 
     @staticmethod
@@ -71,74 +90,88 @@ class Task:
         return Task(**{**data, "budget": Budget(**data["budget"]), "cell": Cell.model_validate(data["cell"])})
 
 
-def run_task(task: Task) -> dict[str, Any]:
-    """Run a task in this process and return its record; what goes wrong becomes a FAILED record."""
+def run_task(task: Task) -> Record:
+    """Run a task in this process and return its record; our own errors become a FAILED record, others get through."""
     began = time.perf_counter()
     try:
         nlp = formulate(task.cell, task.formulation)
-        answer = solve(nlp, task.solver, seed=task.seed, budget=task.budget, preset=task.preset)
-    except (NlpweldError, ArithmeticError, RuntimeError, ValueError) as error:
+        answer = solve(nlp, task.solver, seed=task.seed, budget=task.budget, preset=task.preset, **task.options)
+        held = held_answers(nlp, answer)
+    except NlpweldError as error:
         return failed(task, f"{type(error).__name__}: {error}", time.perf_counter() - began)
-    return _record(task, answer, time.perf_counter() - began)
+    outcome = answer.outcome
+    return Record(
+        **_head(task),
+        status=outcome.status,
+        message=outcome.message,
+        verified=answer.verified,
+        variables=len(nlp.names),
+        placement=None if outcome.x is None else _placement(task.cell, outcome.x),
+        claimed_objective=_number(outcome.objective),
+        evaluations=outcome.evaluations,
+        build_s=outcome.build_s,
+        solve_s=outcome.solve_s,
+        wall_s=time.perf_counter() - began,
+        trace=_trace(task.cell, outcome.trace),
+        answers=held,
+        sharpening=[{name: _number(v) for name, v in step.items()} for step in outcome.sharpening],
+        report=answer.report.to_json() if answer.report else None,
+        branches=_branches(answer),
+    )
 
 
-def failed(task: Task, message: str, wall_s: float) -> dict[str, Any]:
+def failed(task: Task, message: str, wall_s: float, status: str = "FAILED", stderr: list[str] | None = None) -> Record:
     """Return the record of a task that brought no outcome."""
-    return {**_head(task), "status": "FAILED", "message": message, "verified": False, "wall_s": wall_s}
+    ended: dict[str, Any] = {"status": status, "message": message, "stderr": stderr or []}
+    return Record(**_head(task), **ended, verified=False, wall_s=wall_s)
 
 
 def _head(task: Task) -> dict[str, Any]:
+    cores = os.cpu_count() or 0
     return {
-        "format": "nlpweld-record",
-        "version": RECORD_VERSION,
         "key": task.key,
         "cell": task.label or task.cell.name,
         "cell_hash": task.cell.content_hash,
         "formulation": task.formulation,
         "solver": task.solver,
-        "preset": task.preset,
-        "options": presets(task.solver)[task.preset],
+        "preset": task.variant or task.preset,
+        "options": task.chosen,
         "seed": task.seed,
         "budget": asdict(task.budget),
+        "limit_mb": task.limit_mb,
         "versions": {name: version(name) for name in PACKAGES},
-        "machine": {"system": platform.system(), "processor": platform.machine(), "python": platform.python_version()},
+        "machine": {
+            "system": platform.system(),
+            "processor": platform.machine(),
+            "python": platform.python_version(),
+            "cores": cores,
+        },
     }
 
 
-def _record(task: Task, answer: Answer, wall_s: float) -> dict[str, Any]:
-    outcome = answer.outcome
-    return {
-        **_head(task),
-        "status": outcome.status,
-        "message": outcome.message,
-        "verified": answer.verified,
-        "placement": None if outcome.x is None else _placement(task.cell, outcome.x),
-        "claimed_objective": _number(outcome.objective),
-        "evaluations": outcome.evaluations,
-        "build_s": outcome.build_s,
-        "solve_s": outcome.solve_s,
-        "wall_s": wall_s,
-        "trace": [
-            {
-                "time_s": round(step.time_s, 4),
-                "evaluations": step.evaluations,
-                "best": _number(step.best),
-                "mean": _number(step.mean),
-                "spread": _number(step.spread),
-                "placement": {name: round(v, 6) for name, v in _placement(task.cell, step.x).items()},
-            }
-            for step in outcome.trace
-        ],
-        "sharpening": [{name: _number(v) for name, v in step.items()} for step in outcome.sharpening],
-        "report": answer.report and answer.report.to_json(),
-        "branches": answer.plan and answer.plan.branches,
+def _trace(cell: Cell, steps: tuple[Step, ...]) -> Trace:
+    """Return a trace column by column."""
+    places = [_placement(cell, step.x) for step in steps]
+    columns: dict[str, Any] = {
+        "time_s": [round(step.time_s, DIGITS) for step in steps],
+        "evaluations": [step.evaluations for step in steps],
     }
+    for name in ("best", "mean", "spread"):
+        columns[name] = [_number(getattr(step, name)) for step in steps]
+    names = places[0] if places else ()
+    placement = {name: [round(place[name], DIGITS) for place in places] for name in names}
+    return Trace(**columns, placement=placement)
 
 
 def _placement(cell: Cell, x: np.ndarray) -> dict[str, float]:
     """Return all coordinates of a placement by name, those the cell holds included; x may go on with joints."""
     whole = cell.placement(x[: len(cell.variables)]).tolist()
     return dict(zip(VARIABLES, whole, strict=True))
+
+
+def _branches(answer: Answer) -> dict[str, list[str]] | None:
+    branches = answer.plan.branches if answer.plan else None
+    return None if branches is None else {name: list(branch) for name, branch in branches.items()}
 
 
 def _number(value: float) -> float | None:

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from nlpweld.cli import ask, look
+from nlpweld.cli import ask, look, study
+from nlpweld.errors import OptionError
 
 app = typer.Typer(
     help="Place a workpiece among cooperating welding robots, and plan every joint; each answer is verified.",
@@ -88,34 +89,51 @@ def verify(plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a plan fil
 
 @app.command()
 def compare(
-    cells: Annotated[list[str], typer.Argument(metavar="CELL...", help="built-in cells or TOML files")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="folder of the study; what it holds is not run again")],
+    cells: Annotated[list[str] | None, typer.Argument(metavar="[CELL...]", help="built-in cells or TOML files")] = None,
+    from_file: Annotated[Path | None, typer.Option("--study", metavar="FILE", help="a study file, for no CELL")] = None,
     solvers: Annotated[
         str, typer.Option(metavar="A,B,...", help="solvers, each NAME or NAME:PRESET")
     ] = "ipopt,ga,random_search",
     seeds: Annotated[int, typer.Option(min=1, help="seeds 0 to K-1")] = 5,
     workers: Annotated[int, typer.Option(min=1, help="runs at once; use 1 for runtime tables")] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers run the study, or 'local'")
+    ] = None,
+    again: Annotated[bool, typer.Option("--again", help="run once more what the folder holds as FAILED")] = False,
     formulation: Formulation = "reduced",
     time_limit: TimeLimit = None,
     evaluations: Evaluations = None,
+    memory_mb: Annotated[int | None, typer.Option(min=1, help="memory a run may take [MB]")] = None,
     branches: Branches = None,
     reading: Reading = None,
     points: Points = None,
     json: Json = False,
 ) -> int:
-    """Run solvers over seeds on cells, verify every answer, and tabulate."""
-    variants = [ask.variant(name, branches, reading, points) for name in cells]
-    asked = [ask.Question(cell, solvers, formulation, seeds, time_limit, evaluations) for cell in variants]
-    return look.compare(asked, out, workers, json)
+    """Run solvers over seeds on cells, or a study file, verify every answer, and tabulate."""
+    if (from_file is None) == (not cells):
+        raise OptionError("give either CELL... or --study FILE")
+    if from_file is not None:
+        tasks = ask.tasks_of(from_file)
+    else:
+        variants = [ask.variant(name, branches, reading, points) for name in cells or []]
+        tasks = ask.tasks(variants, solvers, formulation, seeds, (evaluations, time_limit), memory_mb)
+    return study.compare(tasks, out, workers, scheduler, again, json)
 
 
 @app.command()
 def tables(folder: Annotated[Path, typer.Argument(metavar="DIR")], json: Json = False) -> None:
     """Write the tables of a study from its stored records."""
-    look.tables(folder, json)
+    study.tables(folder, json)
 
 
 @app.command()
 def plots(folder: Annotated[Path, typer.Argument(metavar="DIR")], json: Json = False) -> None:
     """Draw the figures of a study from its stored records."""
-    look.plots(folder, json)
+    study.plots(folder, json)
+
+
+@app.command()
+def report(folder: Annotated[Path, typer.Argument(metavar="DIR")], json: Json = False) -> None:
+    """Write one page of a study's tables and figures, from its stored records."""
+    study.report(folder, json)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -15,6 +15,9 @@ from rich.console import Console
 from nlpweld.cell import READINGS, Cell, load_cell
 from nlpweld.errors import OptionError, OutputError
 from nlpweld.plan import Plan, load_plan
+
+if TYPE_CHECKING:
+    from nlpweld.bench.task import Task
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,38 @@ def variant(name: str, branches: str | None, reading: str | None, points: int | 
         except ValidationError as error:
             raise OptionError(f"--points {points}: {error.errors()[0]['msg'].lower()}") from None
     return cell
+
+
+def tasks(
+    cells: list[Cell],
+    solvers: str,
+    formulations: str,
+    seeds: int,
+    limits: tuple[int | None, float | None],
+    memory_mb: int | None,
+) -> "list[Task]":
+    """Return the runs asked for by options; limits are evaluations and time [s].
+
+    Raises:
+        OptionError: an unknown solver, preset or formulation.
+    """
+    from nlpweld.bench.answer import known_formulation
+    from nlpweld.bench.run import grid
+    from nlpweld.solvers import Budget
+
+    forms = [known_formulation(name) for name in formulations.split(",")]
+    return grid(cells, solvers.split(","), range(seeds), forms, Budget(*limits), limit_mb=memory_mb)
+
+
+def tasks_of(path: Path) -> "list[Task]":
+    """Return the runs of a study file.
+
+    Raises:
+        CellError: the file, or a cell of it, cannot be used.
+    """
+    from nlpweld.bench.study import load_study
+
+    return load_study(path)
 
 
 def evaluate(

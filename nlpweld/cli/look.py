@@ -1,20 +1,14 @@
-"""Commands that list, run grids, and write tables and figures."""
+"""Commands that list what there is."""
 
 import json as json_
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from nlpweld.cell import library_names, load_cell, load_positioner, load_robot
 from nlpweld.cell.checked import Checked, Sourced, holds_number
-from nlpweld.cli.ask import Question, writable
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def cells(json: bool) -> None:
@@ -84,73 +78,3 @@ def _text(value: Any) -> str:
     if isinstance(value, tuple):
         return "(" + ", ".join(_text(item) for item in value) + ")"
     return f"{value:g}" if isinstance(value, int | float) else str(value)
-
-
-def compare(asked: list[Question], out: Path, workers: int, json: bool) -> int:
-    """Run the grid, keep the records, print the table; 0 when at least one answer is verified."""
-    from nlpweld.bench.run import grid, run
-    from nlpweld.report.tables import write_tables
-    from nlpweld.solvers import Budget
-
-    writable(out)
-    tasks = [
-        task
-        for q in asked
-        for task in grid(
-            [q.cell], q.solver.split(","), range(q.seed), [q.formulation], Budget(q.evaluations, q.time_limit_s)
-        )
-    ]
-    with progress_bar(quiet=json) as bar:
-        job = bar.add_task("running", total=len(tasks))
-        records = run(tasks, out, workers, lambda record, known: bar.advance(job))
-    summary = write_tables(out)
-    if json:
-        print(json_.dumps({"out": str(out), "runs": len(records), "verified": sum(r["verified"] for r in records)}))
-    else:
-        _print_summary(summary)
-        print(f"records and tables: {out}")
-    return 0 if any(r["verified"] for r in records) else 1
-
-
-def progress_bar(quiet: bool = False) -> Progress:
-    """Return a bar with count and times, on standard error."""
-    columns = [
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    ]
-    return Progress(*columns, console=Console(stderr=True, quiet=quiet))
-
-
-def tables(folder: Path, json: bool) -> None:
-    """Write and print the summary of a folder of records."""
-    from nlpweld.report.tables import write_tables
-
-    summary = write_tables(folder)
-    if json:
-        print(summary.to_json(orient="records"))
-    else:
-        _print_summary(summary)
-
-
-def _print_summary(summary: "pd.DataFrame") -> None:
-    from nlpweld.report.tables import format_summary
-
-    console = Console()
-    console.print(format_summary(summary, console.width))
-
-
-def plots(folder: Path, json: bool) -> None:
-    """Draw the figures of a folder of records."""
-    from nlpweld.report.plots import write_plots
-
-    left_out: list[str] = []
-    paths = write_plots(folder, note=left_out.append)
-    if json:
-        print(json_.dumps({"figures": [str(path) for path in paths]}))
-    else:
-        print("\n".join(str(path) for path in paths))
-        if left_out:
-            print(f"{len(left_out)} more need data this folder does not hold, e.g. {left_out[0]}")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from nlpweld.errors import OutputError
+from nlpweld.plan import write_text
 from nlpweld.report import figures
 from nlpweld.report.figures import Drawing
 from nlpweld.report.study import Study
@@ -45,7 +46,7 @@ def write_plots(folder: str | Path, note: Note | None = None) -> list[Path]:
 
 
 def write(drawing: Drawing, study: Study) -> list[Path]:
-    """Draw one figure and save it in every format.
+    """Draw one figure and save it in every format, its data beside it where that is no file of the study.
 
     Raises:
         OutputError: its data lacks a column, or the file cannot be written.
@@ -65,6 +66,8 @@ def write(drawing: Drawing, study: Study) -> list[Path]:
             paths[0].parent.mkdir(parents=True, exist_ok=True)
             for path in paths:
                 figure.savefig(path, metadata={"CreationDate": None} if path.suffix == ".pdf" else None)
+            if drawing.data:
+                write_text(paths[0].with_suffix(".csv"), drawing.data(study).to_csv(index=False, float_format="%.9g"))
         except OSError as error:
             raise OutputError(f"{paths[0]}: cannot be written ({error.strerror}); choose another folder") from None
     return paths

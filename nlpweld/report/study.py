@@ -9,7 +9,10 @@ import pandas as pd
 
 from nlpweld.errors import OutputError
 from nlpweld.plan import Plan, load_plan
-from nlpweld.report.records import load_baselines, load_records, load_traces
+from nlpweld.records.frames import answers_frame, runs_frame, study_records, traces_frame
+from nlpweld.records.model import Record
+from nlpweld.report.records import load_baselines, load_reference
+from nlpweld.report.statistics import Statistics
 
 
 @dataclass(frozen=True)
@@ -20,14 +23,30 @@ class Study:
     _read: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @cached_property
+    def records(self) -> list[tuple[Path, Record]]:
+        """Files and records."""
+        return study_records(self.folder)
+
+    @cached_property
     def runs(self) -> pd.DataFrame:
-        """One row a run."""
-        return load_records(self.folder)
+        """One row a run, with its ``file``."""
+        files = [path.relative_to(self.folder).as_posix() for path, _ in self.records]
+        return runs_frame((record for _, record in self.records), file=files)
 
     @cached_property
     def traces(self) -> pd.DataFrame:
         """One row a step of a run."""
-        return load_traces(self.folder)
+        return traces_frame(record for _, record in self.records)
+
+    @cached_property
+    def answers(self) -> pd.DataFrame:
+        """One row an answer that a run held and the verifier confirmed."""
+        return answers_frame(record for _, record in self.records)
+
+    @cached_property
+    def statistics(self) -> Statistics:
+        """What the runs say of the solvers."""
+        return Statistics(self.runs, self.answers, load_reference(self.folder))
 
     @cached_property
     def baselines(self) -> pd.DataFrame:

@@ -7,8 +7,12 @@ import pandas as pd
 from rich.markup import escape
 from rich.table import Table
 
-from nlpweld.plan import write_text
-from nlpweld.report.records import AXES, load_baselines, load_records, load_reference
+from nlpweld.plan import write_bytes, write_text
+from nlpweld.records.frames import AXES
+from nlpweld.report.markup import latex, markdown
+from nlpweld.report.records import load_reference
+from nlpweld.report.statistics import as_text as statistics_as_text
+from nlpweld.report.study import Study
 
 GROUP = ["cell", "formulation", "solver", "preset"]
 HEADINGS = {
@@ -28,17 +32,13 @@ NARROW = {
 SMALLEST_SPREAD = 1e-5  # what five decimals can show
 WIDE = 100  # columns of a screen that takes the whole summary
 COUNTS = ("runs", "claimed", "verified", "failed")
-LATEX = {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "±": r"$\pm$",
-    "<": r"$<$",
-} | {c: f"\\{c}" for c in "&%$#_{}"}
 
 
 def write_tables(folder: str | Path) -> pd.DataFrame:
-    """Write ``tables/summary.{csv,tex,md}`` and ``tables/runs.csv`` of a study and return the summary.
+    """Write the tables of a study and return the summary.
+
+    Those are ``tables/summary`` and ``tables/statistics`` as CSV, LaTeX and Markdown, ``tables/pairs.csv``,
+    ``tables/runs.csv``, and ``records.parquet`` with the same rows.
 
     Args:
         folder: the study's folder, with ``records/`` and perhaps ``baselines/`` below it.
@@ -47,14 +47,19 @@ def write_tables(folder: str | Path) -> pd.DataFrame:
         OptionError: the folder holds no records.
         OutputError: a record is broken, or the tables cannot be written.
     """
-    folder = Path(folder)
-    runs = load_records(folder)
-    table = summary(runs, load_baselines(folder), load_reference(folder))
-    tables = folder / "tables"
-    write_text(tables / "runs.csv", runs.to_csv(index=False))
-    write_text(tables / "summary.csv", table.to_csv(index=False))
-    write_text(tables / "summary.tex", to_latex(table))
-    write_text(tables / "summary.md", to_markdown(table))
+    study = Study(Path(folder))
+    table = summary(study.runs, study.baselines, load_reference(folder))
+    tables = study.folder / "tables"
+    write_text(tables / "runs.csv", study.runs.to_csv(index=False))
+    write_bytes(study.folder / "records.parquet", study.runs.to_parquet(index=False))
+    write_text(tables / "pairs.csv", study.statistics.pairs.to_csv(index=False))
+    for name, whole, shown in (
+        ("summary", table, as_text(table)),
+        ("statistics", study.statistics.solvers, statistics_as_text(study.statistics.solvers)),
+    ):
+        write_text(tables / f"{name}.csv", whole.to_csv(index=False))
+        write_text(tables / f"{name}.tex", latex(shown))
+        write_text(tables / f"{name}.md", markdown(shown))
     return table
 
 
@@ -113,19 +118,11 @@ def format_summary(table: pd.DataFrame, width: int = 100) -> Table:
     return shown
 
 
-def to_latex(table: pd.DataFrame) -> str:
-    """Return the summary as a LaTeX tabular with booktabs rules."""
-    text = _with_cells(table).map(_escaped)
-    text.columns = [_escaped(name) for name in text.columns]
-    style = text.style.hide(axis="index")
-    return style.to_latex(hrules=True, column_format="ll" + "r" * (len(text.columns) - 2))
-
-
-def to_markdown(table: pd.DataFrame) -> str:
-    """Return the summary as a Markdown table."""
-    text = _with_cells(table).map(lambda value: str(value).replace("|", "\\|"))
-    lines = [text.columns, ["---", "---", *["---:"] * (len(text.columns) - 2)], *text.to_numpy()]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+def as_text(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the summary as strings under the headings people read, the cell first."""
+    text = _as_text(table)
+    text.insert(0, "cell", table["cell"].astype(str))
+    return text
 
 
 def _solver_row(group: pd.DataFrame) -> dict[str, object]:
@@ -174,12 +171,6 @@ def _as_text(table: pd.DataFrame) -> pd.DataFrame:
     return text
 
 
-def _with_cells(table: pd.DataFrame) -> pd.DataFrame:
-    text = _as_text(table)
-    text.insert(0, "cell", table["cell"].astype(str))
-    return text
-
-
 def _label(row: pd.Series, formulations: pd.Series) -> str:
     """Return ``solver``, ``solver:preset``, and the formulation where the table has several."""
     label = row["solver"] if row["preset"] in ("", "default") else f"{row['solver']}:{row['preset']}"
@@ -200,7 +191,3 @@ def _spread(std: float) -> str:
 
 def _shown(value: float, form: str) -> str:
     return "" if pd.isna(value) else form.format(value)
-
-
-def _escaped(text: object) -> str:
-    return "".join(LATEX.get(c, c) for c in str(text))

@@ -1,7 +1,11 @@
-"""Solvers, one file each; a file's name is the solver's name, and adding one is adding its file."""
+"""Solvers, one file each; a file's name is the solver's name, and adding one is adding its file.
+
+Files of your own may stay in folders of your own, named by the environment variable NLPWELD_SOLVERS.
+"""
 
 import difflib
 import importlib
+import os
 import pkgutil
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -9,6 +13,7 @@ from typing import Any
 from nlpweld.errors import OptionError
 from nlpweld.solvers.base import Budget, Outcome, Solver
 
+__path__ += filter(None, os.environ.get("NLPWELD_SOLVERS", "").split(os.pathsep))
 HELPERS = {"base", "population"}
 
 __all__ = ["Budget", "Outcome", "Solver", "make_solver", "presets", "solver_names"]

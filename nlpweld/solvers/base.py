@@ -37,6 +37,17 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
+class Improvement:
+    """A feasible candidate of the exact model that was better than all before it."""
+
+    time_s: float
+    evaluations: int
+    objective: float
+    x: np.ndarray
+    mode: int
+
+
+@dataclass(frozen=True, eq=False)
 class Outcome:
     """What a solver says it did; a claim, until the verifier has looked at it.
 
@@ -52,6 +63,7 @@ class Outcome:
         message: the solver's own last word.
         sharpening: of a solver with soft penalties, one entry for each solve: ``sharpness``, the ``smooth`` objective
             it ended at, the ``exact`` one there, and how much the exact model misses (``missed``).
+        improvements: every feasible candidate that was the best so far, oldest first.
     """
 
     status: Status
@@ -64,6 +76,7 @@ class Outcome:
     trace: tuple[Step, ...] = ()
     message: str = ""
     sharpening: tuple[dict[str, float], ...] = ()
+    improvements: tuple[Improvement, ...] = ()
 
 
 @runtime_checkable
@@ -90,6 +103,7 @@ class Incumbent:
     started: float = field(default_factory=time.perf_counter)
     trace: list[Step] = field(default_factory=list)
     sharpening: list[dict[str, float]] = field(default_factory=list)
+    improvements: list[Improvement] = field(default_factory=list)
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Evaluate candidates (m, n) and remember the best."""
@@ -99,6 +113,9 @@ class Incumbent:
         if (found.total[i], -found.objective[i]) < (self.total, -self.objective):
             self.x, self.mode = np.array(X[i]), int(found.mode[i])
             self.objective, self.total = float(found.objective[i]), float(found.total[i])
+            if self.total == 0.0:
+                told = self.elapsed_s, self.evaluations, self.objective, self.x, self.mode
+                self.improvements.append(Improvement(*told))
         return found
 
     @property
@@ -128,4 +145,4 @@ class Incumbent:
         solve_s = self.elapsed_s - build_s
         cost = self.evaluations, build_s, solve_s
         told = tuple(self.trace), message, tuple(self.sharpening)
-        return Outcome(status, self.x, self.mode, objective, *cost, *told)
+        return Outcome(status, self.x, self.mode, objective, *cost, *told, improvements=tuple(self.improvements))

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -10,17 +11,30 @@ from nlpweld.solvers import Budget
 
 
 def test_a_record_is_plain_json_with_claim_and_verdict_apart(task):
-    record = json.loads(json.dumps(run_task(task), allow_nan=False))
-    assert record["status"] == "SOLVED"
-    assert record["claimed_objective"] == pytest.approx(record["report"]["mmr_mean"], rel=1e-9)
-    assert record["verified"] is record["report"]["feasible"]
-    assert record["evaluations"] == 200
-    assert record["key"] == task.key
+    record = run_task(task)
+    json.dumps(record.model_dump(mode="json"), allow_nan=False)
+    assert record.status == "SOLVED"
+    assert record.claimed_objective == pytest.approx(record.report["mmr_mean"], rel=1e-9)
+    assert record.verified is record.report["feasible"]
+    assert record.evaluations == 200
+    assert record.key == task.key
+
+
+def test_answers_on_the_way_grow_and_end_with_the_runs_own(task):
+    record = run_task(replace(task, solver="ga", budget=Budget(evaluations=500)))
+    assert 1 < len(record.answers) <= 6
+    last = record.answers[-1]
+    assert (last.objective, last.verified) == (record.report["mmr_mean"], record.verified)
+    assert last.time_s == pytest.approx(record.build_s + record.solve_s)
+    for first, then in pairwise(record.answers):
+        assert first.time_s <= then.time_s
+        assert first.evaluations <= then.evaluations
+        assert first.claimed <= then.claimed
 
 
 def test_same_task_same_record_but_for_times(task):
-    timed = ("build_s", "solve_s", "wall_s", "trace")
-    first, again = ({k: v for k, v in run_task(task).items() if k not in timed} for _ in range(2))
+    timed = {"build_s", "solve_s", "wall_s", "trace", "answers"}
+    first, again = (run_task(task).model_dump(exclude=timed) for _ in range(2))
     assert first == again
 
 
@@ -31,6 +45,8 @@ def test_same_task_same_record_but_for_times(task):
         {"solver": "ga"},
         {"budget": Budget(evaluations=201)},
         {"budget": Budget(evaluations=200, time_s=1.0)},
+        {"options": {"batch": 7}},
+        {"limit_mb": 4000},
     ],
 )
 def test_the_key_changes_with_what_decides_the_answer(task, change):
@@ -59,13 +75,13 @@ def test_a_robot_without_a_spherical_wrist_is_a_failed_record_that_says_so(task)
     data = task.to_json()
     data["cell"]["stations"][2]["robot"]["joints"][4]["d_m"] = 0.05
     record = run_task(Task.from_json(data))
-    assert record["status"] == "FAILED"
-    assert record["verified"] is False
-    assert "welder" in record["message"]
-    assert "not spherical" in record["message"]
+    assert record.status == "FAILED"
+    assert record.verified is False
+    assert "welder" in record.message
+    assert "not spherical" in record.message
 
 
 def test_a_time_limit_is_a_timeout_record_with_the_best_so_far(task):
     record = run_task(replace(task, solver="ga", budget=Budget(time_s=0.3)))
-    assert record["status"] == "TIMEOUT"
-    assert record["placement"] is not None
+    assert record.status == "TIMEOUT"
+    assert record.placement is not None

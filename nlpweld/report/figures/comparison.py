@@ -19,7 +19,17 @@ def drawings(study: Study) -> list[Drawing]:
     """Return one set of figures for each cell."""
     kinds = {"mmr_by_solver": mmr_by_solver, "solve_time_by_solver": solve_time_by_solver, "progress": progress}
     cells = study.runs["cell"].unique()
-    return [Drawing(f"{kind}-{cell}", partial(draw, cell=cell)) for cell in cells for kind, draw in kinds.items()]
+    return [
+        Drawing(f"{kind}-{cell}", partial(draw, cell=cell), data=partial(drawn, cell=cell, traces=kind == "progress"))
+        for cell in cells
+        for kind, draw in kinds.items()
+    ]
+
+
+def drawn(study: Study, cell: str, traces: bool) -> pd.DataFrame:
+    """Return what a figure of one cell is drawn from: its traces, or its runs."""
+    table = study.traces if traces else study.runs
+    return table[table["cell"] == cell]
 
 
 def labelled(table: pd.DataFrame, cell: str) -> pd.DataFrame:
