@@ -11,12 +11,11 @@ import time
 from dataclasses import dataclass
 from typing import IO, Any
 
+from nlpweld.solvers.starts import SINGLE_THREADED
+
 GRACE_S = 30.0  # on top of a task's time limit: start-up, verification
 TAIL = 12  # lines on standard error that are kept of a process that failed
 WORKER = [sys.executable, "-m", "nlpweld.bench.worker"]
-SINGLE_THREADED = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
 
 
 @dataclass(frozen=True)

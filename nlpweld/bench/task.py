@@ -115,6 +115,7 @@ def run_task(task: Task) -> Record:
         trace=_trace(task.cell, outcome.trace),
         answers=held,
         sharpening=[{name: _number(v) for name, v in step.items()} for step in outcome.sharpening],
+        starts=[_number(objective) for objective in outcome.starts],
         report=answer.report.to_json() if answer.report else None,
         branches=_branches(answer),
     )

@@ -9,8 +9,9 @@ import numpy as np
 
 from nlpweld.cell.cell import Cell
 from nlpweld.engine.choice import chosen_engine
+from nlpweld.formulation.branches import SAMPLES, Screening
 from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.nlp import Evaluation
+from nlpweld.formulation.nlp import Evaluation, sobol
 from nlpweld.formulation.paths import allowed
 from nlpweld.formulation.stage import Stage
 from nlpweld.formulation.staged import Staged
@@ -76,6 +77,12 @@ class Batch:
     def evaluator(self) -> Evaluator:
         """What judges placements on the chosen engine."""
         return evaluator(self.chosen_engine, self.cell, self.stage, self.points, self.arm_branches)
+
+    @cached_property
+    def screening(self) -> Screening:
+        """What a sample of the box says of the modes."""
+        X = sobol(self.cell.box[0], self.cell.box[1], 0, SAMPLES)
+        return Screening(X, Staged(self.cell, self.stage, self.points, self.arm_branches).keeps(X))
 
     def prepare(self) -> None:
         """Build, compile and run everything once, so that what follows measures evaluation alone."""

@@ -12,7 +12,7 @@ before that. It is a penalty at the seam's points, not a wall, so the exact mode
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import casadi as ca
 import numpy as np
@@ -66,6 +66,7 @@ def full(cell: Cell, engine: str = "auto") -> Nlp:
         widened=lambda extra: full(with_margins(cell, extra), engine),
         sample=form.starts,
         prepare=form.prepare,
+        rebuild=partial(full, cell, engine),
     )
 
 

@@ -7,6 +7,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from nlpweld.formulation.branches import Screening
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -87,6 +89,10 @@ class Nlp:
         refine: ``(start, mode) -> `` a better start nearby, by other means than derivatives, or None.
         sample: ``(seed, count) -> `` start points (count, n); spread over the whole box by default.
         prepare: builds what ``evaluate`` needs, so that its cost can be told apart; None where there is nothing.
+        screen: tells which modes a sample met, where there is more than one; those in doubt are to be followed last.
+            None where nothing is known.
+        rebuild: builds this problem again in another process, so it can be pickled; None where that cannot be. Whoever
+            replaces what the problem computes replaces this, too.
     """
 
     problem: str
@@ -103,6 +109,8 @@ class Nlp:
     refine: Callable[[np.ndarray, int], np.ndarray | None] | None = None
     sample: Callable[[int, int], np.ndarray] | None = None
     prepare: Callable[[], None] | None = None
+    screen: Callable[[], Screening] | None = None
+    rebuild: Callable[[], "Nlp"] | None = None
 
     def starts(self, seed: int, count: int) -> np.ndarray:
         """Return start points in the box from a scrambled Sobol sequence, shape (count, n)."""

@@ -1,7 +1,7 @@
 """The reduced form: the placement's coordinates are the variables, joints eliminated by inverse kinematics."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from nlpweld.cell.cell import Cell
 from nlpweld.formulation.batch import CONSTRAINTS, Batch
 from nlpweld.formulation.holder import held
 from nlpweld.formulation.margins import with_margins
-from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
+from nlpweld.formulation.nlp import Nlp, Relaxation
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, on_wrist, settle
 from nlpweld.formulation.smooth import Gaps, near_gaps, relaxation
 from nlpweld.formulation.stage import Stage
@@ -57,6 +57,8 @@ def reduced(cell: Cell, engine: str = "auto") -> Nlp:
         n_modes=len(batch.modes),
         widened=lambda extra: reduced(with_margins(cell, extra), engine),
         prepare=batch.prepare,
+        screen=(lambda: batch.screening) if len(batch.modes) > 1 else None,
+        rebuild=partial(reduced, cell, engine),
     )
 
 
@@ -66,13 +68,11 @@ class Relaxer:
 
     Attributes:
         batch: the exact model; it tells which bodies can come near each other.
-        scouts: placements looked at for that.
-        within_m: bodies that never come nearer than this at any scout are left out.
-        enough: scouts that must count, else nothing is left out.
+        within_m: bodies that never come nearer than this at any sample of the mode are left out.
+        enough: samples that must count, else nothing is left out.
     """
 
     batch: Batch
-    scouts: int = 512
     within_m: float = 0.2
     enough: int = 4
 
@@ -86,19 +86,11 @@ class Relaxer:
         return relaxation(batch.stage, batch.modes[mode], gaps, batch.chosen_engine)
 
     def _near(self, mode: int) -> Gaps | None:
-        """Return the distances that matter at the scouts that keep all else, or nearly so; None if they are too few."""
-        X, found = self._scouted
-        X = X[np.isfinite(found.objective) & (found.mode == mode)]
+        """Return the distances that matter where the mode keeps all else, or nearly so; None if that is too seldom."""
+        X = self.batch.screening.at(mode)
         if len(X) < self.enough:
             return None
         return near_gaps(self.batch.stage, self.batch.modes[mode], X, self.batch.points, self.within_m)
-
-    @cached_property
-    def _scouted(self) -> tuple[np.ndarray, Evaluation]:
-        """Random placements (m, 3) [m] and what the exact model says of them, once for all modes."""
-        lower, upper = self.batch.cell.box
-        X = sobol(lower, upper, 0, self.scouts)
-        return X, self.batch.evaluate(X)
 
 
 @dataclass(frozen=True)

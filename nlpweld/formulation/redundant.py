@@ -5,7 +5,7 @@ variables, not hundreds, and no path jumps. How far any joint turns from one sea
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import casadi as ca
@@ -13,6 +13,7 @@ import numpy as np
 
 from nlpweld.cell.cell import Cell
 from nlpweld.formulation.batch import CONSTRAINTS, Batch, Evaluator, evaluator
+from nlpweld.formulation.branches import SAMPLES, Screening
 from nlpweld.formulation.coded import Assembly, Coding, Piece
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.derivatives import by_functions, lanes_of
@@ -23,12 +24,14 @@ from nlpweld.formulation.reduced import OutOfReach, Unpacker
 from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps, step_function, term_function
 from nlpweld.formulation.splines import basis
 from nlpweld.formulation.stage import Stage
+from nlpweld.formulation.staged import Staged
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs
 from nlpweld.plan import Plan
 
 REDUNDANT = {"spin": "redundant_spin", "spin_yaw": "redundant_spin_yaw", "spin_yaw_tilt": "redundant"}
 CONTROL_POINTS = 24
+TURNS = 32  # angles that are screened, a divisor of SAMPLES
 STEP_MARGIN_DEG = 0.05  # by which solvers stay under the bound on joint steps
 
 
@@ -62,6 +65,8 @@ def redundant(cell: Cell, engine: str = "auto", level: str = "spin_yaw_tilt", co
         refine=form.refined,
         sample=form.starts,
         prepare=form.prepare,
+        screen=(lambda: form.screening) if len(form.batch.modes) > 1 else None,
+        rebuild=partial(redundant, cell, engine, level, controls),
     )
 
 
@@ -110,6 +115,16 @@ class Redundant:
     def _evaluator(self) -> Evaluator:
         points = np.vstack([self.data, np.zeros((len(self.names), self.data.shape[1]))])
         return evaluator(self.batch.chosen_engine, self.cell, self.stage, points, self.batch.arm_branches)
+
+    @cached_property
+    def screening(self) -> Screening:
+        """What a sample of placements, some to each of fewer angles, says of the modes."""
+        Z, d = self.starts(0, SAMPLES), self.coding.d
+        judge, kept = Staged(self.cell, self.stage, self.points(Z[0])[1], self.batch.arm_branches), []
+        for some in np.split(Z, TURNS):
+            some[:, d:] = some[0, d:]
+            kept.append(judge.at(self.points(some[0])[1]).keeps(some[:, :d]))
+        return Screening(Z, np.concatenate(kept))
 
     @cached_property
     def _grips(self) -> list[ca.Function]:

@@ -97,6 +97,21 @@ class Staged:
         object.__setattr__(other, "points", points)
         return other
 
+    def keeps(self, X: np.ndarray) -> np.ndarray:
+        """Tell whether stations on branches keep reach and joint limits and lack at most a tenth of the floor.
+
+        Args:
+            X: placements, shape (m, d).
+
+        Returns:
+            by placement, station and arm branch, shape (m, S, B).
+        """
+        kept = np.zeros((len(X), len(self.cell.stations), len(self.arm_branches)), dtype=bool)
+        for k in range(kept.shape[1]):
+            for b, branch in enumerate(self.arm_branches):
+                kept[self._gripped(k, X, branch)[1], k, b] = True
+        return kept
+
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X, shape (m, d)."""
         parts = [self._block(X[block]) for block in _slices(len(X), self._candidates(BLOCK))]

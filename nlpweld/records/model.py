@@ -89,6 +89,7 @@ class Record(Part):
         wall_s: time of the process from its start to its end, verification included.
         answers: what the run held on its way, oldest first.
         sharpening: what soft penalties cost, solve by solve.
+        starts: objective that each start of a multi-start came to; None where it brought nothing.
         report: the verifier's report.
         branches: branch of every robot.
     """
@@ -121,5 +122,6 @@ class Record(Part):
     trace: Trace = Trace()
     answers: list[Held] = []
     sharpening: list[dict[str, float | None]] = []
+    starts: list[float | None] = []
     report: dict[str, Any] | None = None
     branches: dict[str, list[str]] | None = None

@@ -64,6 +64,7 @@ class Outcome:
         sharpening: of a solver with soft penalties, one entry for each solve: ``sharpness``, the ``smooth`` objective
             it ended at, the ``exact`` one there, and how much the exact model misses (``missed``).
         improvements: every feasible candidate that was the best so far, oldest first.
+        starts: of a multi-start, the exact objective every start came to, NaN where it brought nothing feasible.
     """
 
     status: Status
@@ -77,6 +78,7 @@ class Outcome:
     message: str = ""
     sharpening: tuple[dict[str, float], ...] = ()
     improvements: tuple[Improvement, ...] = ()
+    starts: tuple[float, ...] = ()
 
 
 @runtime_checkable

@@ -21,14 +21,15 @@ EQUAL = {
     "line_search_method": "penalty",
     "watchdog_shortened_iter_trigger": 0,  # which that line search does not know
 }
+Start = tuple[np.ndarray, int]  # a point and its mode
 
 
 @dataclass(frozen=True)
 class Ipopt:
     """Interior-point solves of ever sharper penalties, each started from the last.
 
-    A descent that ends infeasible (the penalties' own local minimum) is followed by one from the next random
-    start, which is still the same seed's; the message says how many starts it took.
+    A descent that ends infeasible (the penalties' own local minimum), or betters no feasible scout, is followed by one
+    from the next random start, which is still the same seed's; the message says how many starts it took.
 
     Attributes:
         sharpness: first sharpness of the soft penalties.
@@ -37,7 +38,8 @@ class Ipopt:
         settled: relative gain in objective below which a feasible answer is final.
         hopeless: total violation after the third solve above which a descent is given up.
         descents: random starts at most.
-        modes_tried: where there are discrete choices, how many are followed, the most promising first.
+        modes_tried: where there are discrete choices, how many are followed, the most promising first; those that a
+            sample of the search never met come after all others.
         scouts: random candidates of the exact model, the best of which are started from (and rank the discrete
             choices); 0 starts from the first random point itself.
         tol: Ipopt's tolerance.
@@ -70,19 +72,22 @@ class Ipopt:
         search = Incumbent(nlp)
         run = _Run(nlp, self, search, budget)
         tried = 0
-        for group in self._starts(search, seed, budget):
+        groups = self._starts(search, seed, budget)
+        scouted = search.objective if search.total == 0.0 else float("-inf")  # which descents are to better
+        for group in groups:
             for start, mode in _with_refined(nlp, group):
                 tried += 1
                 run.descend(start, mode)
                 if run.stopped:
                     return search.outcome(run.build_s, f"{run.stopped} in descent {tried}")
-            if search.total == 0.0:
+            if search.total == 0.0 and search.objective > scouted:
                 break
             run.widen()
-        return search.outcome(run.build_s, f"{run.last}; {tried} descents, {run.iterations} iterations")
+        seen = f"; {nlp.screen()}" if nlp.screen else ""
+        return search.outcome(run.build_s, f"{run.last}; {tried} descents, {run.iterations} iterations{seen}")
 
-    def _starts(self, search: Incumbent, seed: int, budget: Budget) -> list[list[tuple[np.ndarray, int]]]:
-        """Return groups of (start, mode); a group is followed whole, the next only if it brought nothing feasible."""
+    def _starts(self, search: Incumbent, seed: int, budget: Budget) -> list[list[Start]]:
+        """Return groups of (start, mode); a group is followed whole, the next only if it brought nothing better."""
         nlp = search.nlp
         if self.scouts == 0 and nlp.n_modes == 1:
             return [[(start, 0)] for start in nlp.starts(seed, self.descents)]
@@ -91,13 +96,28 @@ class Ipopt:
         order = np.lexsort((-found.objective, found.total))
         if nlp.n_modes == 1:
             return [[(X[i], 0)] for i in order[: self.descents]]
-        first = {int(found.mode[i]): X[i] for i in order[::-1]}  # the best scout of each mode
-        ranked = list(dict.fromkeys(int(found.mode[i]) for i in order))
-        starts = [(first[mode], mode) for mode in ranked]
-        return [starts[: self.modes_tried], *([s] for s in starts[self.modes_tried : self.descents])]
+        return self._by_mode(nlp, X[order], found.mode[order], np.isfinite(found.objective[order]))
+
+    def _by_mode(self, nlp: Nlp, X: np.ndarray, modes: np.ndarray, seen: np.ndarray) -> list[list[Start]]:
+        """Return a start for each mode: scouts (m, n), best first, with their modes and whether these are possible.
+
+        A mode that a sample met but no scout is best on starts from that sample. Modes in doubt come last.
+        """
+        starts = {int(mode): x for mode, x in zip(modes[::-1], X[::-1], strict=True)}  # the best scout of each
+        ranked, doubt = dict.fromkeys(modes.tolist()), np.zeros(nlp.n_modes)
+        if nlp.screen:
+            screening = nlp.screen()
+            met = np.flatnonzero(screening.doubt == 0).tolist()
+            starts = {mode: screening.at(mode)[0] for mode in met} | starts
+            doubt[:] = screening.doubt
+            doubt[modes[seen]] = 0  # scouts are samples, too
+        order = sorted(ranked | starts, key=lambda mode: doubt[mode])
+        together = min(self.modes_tried, int((doubt[order] == doubt[order[0]]).sum()))
+        groups = [order[:together], *([mode] for mode in order[together : self.descents])]
+        return [[(starts[mode], mode) for mode in group] for group in groups]
 
 
-def _with_refined(nlp: Nlp, group: list[tuple[np.ndarray, int]]) -> Iterator[tuple[np.ndarray, int]]:
+def _with_refined(nlp: Nlp, group: list[Start]) -> Iterator[Start]:
     """Yield starts with their modes, each after what the problem makes of it, if it knows how to better one."""
     for start, mode in group:
         better = nlp.refine(start, mode) if nlp.refine else None

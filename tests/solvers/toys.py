@@ -1,9 +1,16 @@
 """Small problems with known answers, as solvers see them."""
 
+import os
+import signal
+import time
+from functools import partial
+from pathlib import Path
+
 import casadi as ca
 import numpy as np
 
-from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation
+from nlpweld.formulation.branches import Screening
+from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 
 PEAK = np.array([0.3, -0.2])
 
@@ -36,3 +43,94 @@ def optimum(nlp_radius: float, peak: np.ndarray = PEAK, centre: tuple[float, flo
     """The point of the disc nearest to the peak."""
     step = peak - np.array(centre)
     return np.array(centre) + step * min(1.0, nlp_radius / np.linalg.norm(step))
+
+
+def ripples(
+    radius: float = 2.0, slow_s: float = 0.0, deadly: int | None = None, wrong: int | None = None, seen: str = ""
+) -> Nlp:
+    """Maximise waves on a hill, nine of them within the box; the best is at (0, 0) and worth 1.
+
+    Args:
+        radius: of the disc; negative, nothing is feasible.
+        slow_s: how long a candidate takes [s].
+        deadly: the seed of starts that kills the process.
+        wrong: the seed of starts that raises an error.
+        seen: a folder where every process that draws starts leaves a file by its number.
+    """
+    free = disc(radius, centre=(0.0, 0.0))
+    x, p = ca.SX.sym("x", 2), ca.SX.sym("p")
+    wave = 0.5 * ca.sum1(ca.cos(3 * np.pi * x)) - 0.4 * ca.sumsqr(x)
+    exact = ca.Function("exact", [x], [wave])
+    hessian, gradient = ca.hessian(-wave, x)
+    relaxed = Relaxation(*(ca.Function(n, [x, p], [e]) for n, e in (("v", -wave), ("g", gradient), ("h", hessian))))
+
+    def evaluate(X: np.ndarray) -> Evaluation:
+        time.sleep(slow_s * len(X))
+        found = free.evaluate(X)
+        return Evaluation(np.array(exact(X.T)).ravel(), found.violation, found.mode)
+
+    def sample(seed: int, count: int) -> np.ndarray:
+        if seen:
+            (Path(seen) / str(os.getpid())).touch()
+        if seed == deadly:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if seed == wrong:
+            raise ValueError("a start that cannot be drawn")
+        return sobol(free.lower, free.upper, seed, count)
+
+    rebuild = partial(ripples, radius, slow_s, deadly, wrong, seen)
+    box = free.lower, free.upper, free.constraints
+    relax = (lambda mode, whole: relaxed) if radius > 1.5 else free.relax
+    return Nlp("ripples", "toy", free.names, *box, evaluate, relax=relax, sample=sample, rebuild=rebuild)
+
+
+def two_hills() -> Nlp:
+    """Maximise over two hills, of which the higher, about x = -0.5, has its top forbidden in a hole 0.4 wide.
+
+    The relaxation knows no hole, so a descent on that hill ends in it. The starts are one beside the hole, which is
+    feasible, and a lower one on the other hill, whose top is worth 0.97.
+    """
+    x, p = ca.SX.sym("x"), ca.SX.sym("p")
+    height = ca.exp(-20 * (x + 0.5) ** 2) + 0.97 * ca.exp(-20 * (x - 0.5) ** 2)
+    exact = ca.Function("exact", [x], [height])
+    hessian, gradient = ca.hessian(-height, x)
+    relaxed = Relaxation(*(ca.Function(n, [x, p], [e]) for n, e in (("v", -height), ("g", gradient), ("h", hessian))))
+
+    def evaluate(X: np.ndarray) -> Evaluation:
+        inside = np.maximum(0.0, 0.2 - np.abs(X + 0.5))
+        return Evaluation(np.array(exact(X.T)).ravel(), inside, np.zeros(len(X), dtype=int))
+
+    def sample(seed: int, count: int) -> np.ndarray:
+        return np.array([[-0.29], [0.25]])
+
+    box = np.ones(1)
+    return Nlp("hills", "toy", ("x",), -box, box, ("hole",), evaluate, relax=lambda *_: relaxed, sample=sample)
+
+
+def strips(closed: tuple[int, ...], met: tuple[int, ...], followed: list[int] | None = None) -> Nlp:
+    """Maximise y on one of four vertical strips, the modes; the further to the right, the more it promises.
+
+    Args:
+        closed: strips where nothing is feasible.
+        met: strips that a sample met.
+        followed: takes down the modes that are descended on, in their order.
+    """
+
+    def evaluate(X: np.ndarray) -> Evaluation:
+        mode = np.clip(np.floor(2 * X[:, 0] + 2), 0, 3).astype(int)
+        missed = np.where(np.isin(mode, closed), 1.0 - 0.1 * mode, 0.0)
+        return Evaluation(np.where(missed > 0.0, -np.inf, X[:, 1] + mode), missed[:, None], mode)
+
+    def relax(mode: int, whole: bool) -> Relaxation:
+        if followed is not None:
+            followed.append(mode)
+        x, p = ca.SX.sym("x", 2), ca.SX.sym("p")
+        value = (x[0] - 0.5 * mode + 0.75) ** 2 - x[1]
+        hessian, gradient = ca.hessian(value, x)
+        return Relaxation(*(ca.Function(n, [x, p], [e]) for n, e in (("v", value), ("g", gradient), ("h", hessian))))
+
+    kept = np.zeros((4, 1, 4), dtype=bool)
+    kept[list(met), 0, list(met)] = True
+    box = np.ones(2)
+    screen = partial(Screening, np.zeros((4, 2)), kept)
+    return Nlp("strips", "toy", ("x", "y"), -box, box, ("open",), evaluate, relax=relax, n_modes=4, screen=screen)

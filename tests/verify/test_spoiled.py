@@ -55,6 +55,17 @@ def test_wrist_flipped_over_half_the_seam(plan: Plan, robot):
     assert {(v.robot, v.joint) for v in found(report, "branch")} == {(robot, "J5")}
 
 
+@pytest.mark.parametrize(("joint", "singular_deg"), [(2, -80.2), (4, 0.0)])
+def test_path_that_passes_smoothly_through_a_singularity_and_back(plan: Plan, joint, singular_deg):
+    path = plan.paths["welder"].copy()
+    beyond = 2 * np.radians(singular_deg) - path[:, joint]  # the other side, as far off
+    path[:, joint] += (beyond - path[:, joint]) * np.sin(np.linspace(0, np.pi, len(path))) ** 2
+    assert np.abs(np.diff(path[:, joint])).max() < 0.15
+    report = verify(with_path(plan, "welder", path))
+    assert ("welder", f"J{joint + 1}") in {(v.robot, v.joint) for v in found(report, "branch")}
+    assert {v.robot for v in found(report, "singularity")} == {"welder"}
+
+
 @pytest.mark.parametrize(
     ("feature", "label", "joint"), [(0, "back", "J1"), (1, "down", "J3"), (2, "flip", "J5"), (2, "up", "J5")]
 )
