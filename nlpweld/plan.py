@@ -125,10 +125,12 @@ def wrong_points(cell: Cell, s: np.ndarray) -> str | None:
 def free_names(cell: Cell) -> tuple[str, ...]:
     """Return the names of the angles a plan of the cell may turn off their nominal values, whatever their bands.
 
-    ``yaw``, ``slope`` and ``rotation`` of the workpiece where robots carry it; ``spin.<station>`` of every torch, and
+    ``yaw`` of the workpiece where robots carry it, ``slope`` and ``rotation`` there and where a positioner of two axes
+    holds it: one axis reaches but one rotation for every slope. ``spin.<station>`` of every torch, and
     ``travel.<station>`` and ``work.<station>`` of one that is held by angles.
     """
-    names = [] if cell.positioner else ["yaw", *TILTS]
+    held = cell.positioner
+    names = ["yaw", *TILTS] if held is None else [*TILTS] if len(held.robot.joints) == 2 else []
     for station in cell.stations:
         if isinstance(station.coupling, Torch):
             kinds = ("spin",) if station.coupling.angles is None else ("spin", "travel", "work")

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nlpweld.cell import Cell, load_cell
+from nlpweld.cell import Cell, load_cell, load_positioner
 from nlpweld.errors import OutputError, PlanError
 from nlpweld.plan import Plan, free_names, joint_counts, load_plan, write_text
 
@@ -79,7 +79,10 @@ def test_plan_without_freedom_has_none(saved: Path) -> None:
 
 def test_free_angles_are_those_the_couplings_leave() -> None:
     assert free_names(CELL) == ("yaw", "slope", "rotation", "spin.welder")
-    assert free_names(DUAL) == tuple(f"{a}.robot_{k}" for k in (1, 2) for a in ("spin", "travel", "work"))
+    torches = tuple(f"{a}.robot_{k}" for k in (1, 2) for a in ("spin", "travel", "work"))
+    assert free_names(DUAL) == ("slope", "rotation", *torches)
+    held = DUAL.positioner.model_copy(update={"robot": load_positioner("rotator")})
+    assert free_names(DUAL.model_copy(update={"positioner": held})) == torches
 
 
 def test_freedom_is_put_on_a_copy() -> None:
@@ -201,7 +204,6 @@ POSITIONER_CHANGES = {
     "other_name": (put([[0.0, 0.0]] * 7, "paths_rad", "table"), "paths_rad.table: "),
     "s_beyond_one": (put(1.001, "s", -1), "s: not at least two increasing numbers in [0, 1]"),
     "yaw": (put([0.0] * 7, "freedom_rad", "yaw"), "freedom_rad.yaw: the cell has no free angle"),
-    "tilt": (put([0.0] * 7, "freedom_rad", "slope"), "freedom_rad.slope: the cell has no free angle"),
     "one_point": (put([0.1], "s"), "s: not at least two increasing numbers in [0, 1]"),
 }
 

@@ -87,9 +87,10 @@ class Freedom(Sourced):
     """What a weld leaves free along the seam, for the redundant formulations; bands are offsets from the nominal [deg].
 
     ``spin_deg``: torch about its own axis. ``yaw_deg``: workpiece about the vertical, where robots carry it.
-    ``slope_deg``, ``rotation_deg``: how far the weld may be tilted off its position (ISO 6947). ``travel_deg``,
-    ``work_deg``: tilt of a torch that is held by angles. ``joint_step_deg``: how far any joint may turn from one seam
-    point to the next.
+    ``slope_deg``, ``rotation_deg``: how far the weld may be tilted off its position (ISO 6947), by the robots that
+    carry it or by a positioner of two axes; not by one axis, nor where a corner of the bands brings the weld within a
+    degree of the table axis. ``travel_deg``, ``work_deg``: tilt of a torch that is held by angles. ``joint_step_deg``:
+    how far any joint of a robot may turn from one seam point to the next, and of a positioner that tilts the weld.
     """
 
     spin_deg: Band = (-180.0, 180.0)

@@ -11,8 +11,9 @@ import numpy as np
 from nlpweld.cell.cell import VARIABLES, Cell
 from nlpweld.cell.station import Station
 from nlpweld.cell.task import Grasp, Torch, TorchAngles
-from nlpweld.formulation.freedom import turn, turned_work
+from nlpweld.formulation.freedom import TILTS, turn, turned_work
 from nlpweld.formulation.holder import held, posture_frames
+from nlpweld.formulation.tilting import TiltedTable, table_data, tilted_table
 from nlpweld.geometry.seam import weld_frames
 from nlpweld.geometry.torch_angles import torch_pose
 from nlpweld.geometry.weld_angles import weld_rotations
@@ -36,6 +37,7 @@ class WeldPoint:
         ends_P: ends of the positioner's moving bodies in {P}, side by side, shape (3, 2b) [m].
         data: what is known of the point, shape (k, 1), in the order of :func:`point_data`.
         free: its free angles, shape (f, 1) [rad].
+        table: the positioner, where it tilts the weld by free angles.
     """
 
     T_P_C: Frame
@@ -44,6 +46,7 @@ class WeldPoint:
     ends_P: ca.SX
     data: ca.SX
     free: ca.SX
+    table: TiltedTable | None = None
 
     @property
     def vector(self) -> ca.SX:
@@ -55,21 +58,35 @@ def weld_point(cell: Cell, free: Names = ()) -> WeldPoint:
     """Return fresh symbols for a seam point at which some angles are free."""
     u = ca.SX.sym("free", len(free))
     angles = dict(zip(free, ca.vertsplit(u), strict=True)) if free else {}
-    blocks = [ca.SX.sym("R_P_C", 3, 3)]
-    if cell.positioner:
-        blocks.append(ca.SX.sym("p_P_C", 3))
-    nominal = Frame(blocks[0], blocks[1] if cell.positioner else ca.SX(3, 1))
-    R_P_p = ca.SX.sym("R_P_p", 3, 3) if tilts(free) else None
-    blocks += [] if R_P_p is None else [R_P_p]
+    table = tilted_table(cell.positioner, *(angles[t] for t in TILTS)) if cell.positioner and tilts(free) else None
+    T_P_C, blocks = (table.T_P_C, [*table.symbols]) if table else _work(cell, angles)
     targets: list[Frame | None] = []
     for station in cell.stations:
         target, symbols = _target(station, angles)
         targets.append(target)
         blocks += symbols
-    ends_P = ca.SX.sym("ends_P", 3, 2 * len(moving_bodies(cell)))
-    data = ca.vertcat(*[ca.vec(block) for block in [*blocks, ends_P]])
+    ends_P = _table_ends(cell, table.links) if table else ca.SX.sym("ends_P", 3, 2 * len(moving_bodies(cell)))
+    data = ca.vertcat(*[ca.vec(block) for block in (blocks if table else [*blocks, ends_P])])
     spins = tuple(None if s.coupling.kind == "tight" else angles.get(f"spin.{s.name}") for s in cell.stations)
-    return WeldPoint(turned_work(nominal, R_P_p, angles), tuple(targets), spins, ends_P, data, u)
+    return WeldPoint(T_P_C, tuple(targets), spins, ends_P, data, u, table)
+
+
+def _work(cell: Cell, angles: dict[str, ca.SX]) -> tuple[Frame, list[ca.SX]]:
+    """Return the workpiece in {P} where no positioner tilts it, and the symbols it takes from the point's data."""
+    blocks = [ca.SX.sym("R_P_C", 3, 3)]
+    if cell.positioner:
+        blocks.append(ca.SX.sym("p_P_C", 3))
+    nominal = Frame(blocks[0], blocks[1] if cell.positioner else ca.SX(3, 1))
+    R_P_p = ca.SX.sym("R_P_p", 3, 3) if tilts(tuple(angles)) else None
+    return turned_work(nominal, R_P_p, angles), blocks + ([] if R_P_p is None else [R_P_p])
+
+
+def _table_ends(cell: Cell, links: list[Frame]) -> ca.SX:
+    """Return the ends of the positioner's moving bodies, side by side, shape (3, 2b) [m], in the links' frame."""
+    assert cell.positioner is not None
+    bodies = [cell.positioner.robot.bodies[i] for i in moving_bodies(cell)]
+    ends = [links[int(end.frame[4:])].point(end.at_m) for body in bodies for end in (body.start, body.end)]
+    return ca.horzcat(*ends) if ends else ca.SX(3, 0)
 
 
 def tilts(free: Names) -> bool:
@@ -98,17 +115,23 @@ def _target(station: Station, angles: dict[str, ca.SX]) -> tuple[Frame | None, l
 
 def point_data(cell: Cell, s: np.ndarray, free: Names = ()) -> np.ndarray:
     """Return the numbers behind :attr:`WeldPoint.data` at seam parameters s (N,), shape (k, N)."""
+    tilting = cell.positioner if tilts(free) else None
+    rows, ends = (table_data(cell, tilting, s), []) if tilting else _work_data(cell, s, tilts(free))
+    for station in cell.stations:
+        if isinstance(station.coupling, Torch):
+            rows += _target_data(cell, station.coupling, s, f"travel.{station.name}" in free)
+    return np.concatenate([*rows, *ends], axis=1).T
+
+
+def _work_data(cell: Cell, s: np.ndarray, tilted: bool) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the numbers of :func:`_work`, and those of the ends of the positioner's moving bodies."""
     work = held(cell, s)
     rows = [_columns(work.T_P_C[:, :3, :3])]
     if cell.positioner:
         rows.append(work.T_P_C[:, :3, 3])
-    if tilts(free):
+    if tilted:
         rows.append(_columns(work.T_P_C[:, :3, :3] @ posture_frames(cell, s)))
-    for station in cell.stations:
-        if isinstance(station.coupling, Torch):
-            rows += _target_data(cell, station.coupling, s, f"travel.{station.name}" in free)
-    rows.append(work.ends_P[:, moving_bodies(cell)].reshape(len(s), -1))
-    return np.concatenate(rows, axis=1).T
+    return rows, [work.ends_P[:, moving_bodies(cell)].reshape(len(s), -1)]
 
 
 def _target_data(cell: Cell, torch: Torch, s: np.ndarray, tilted: bool) -> list[np.ndarray]:

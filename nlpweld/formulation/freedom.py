@@ -10,6 +10,7 @@ from nlpweld.cell.cell import Cell
 from nlpweld.cell.levels import Freedom
 from nlpweld.cell.task import Torch
 from nlpweld.errors import OptionError
+from nlpweld.formulation.tilting import may_tilt
 from nlpweld.kinematics.chain import Frame
 
 LEVELS = {  # of freedom, each with the one before
@@ -38,8 +39,10 @@ class FreeAngle:
 def free_angles(cell: Cell, level: str) -> tuple[FreeAngle, ...]:
     """Return the angles a level of freedom leaves free in a cell.
 
-    Robots that carry the workpiece may yaw and tilt it. A positioner decides both, so that there the torches spin and,
-    held by angles, tilt instead; the level ``spin_yaw`` is then the level ``spin``.
+    Robots that carry the workpiece may yaw and tilt it. A positioner decides the yaw, so that there the level
+    ``spin_yaw`` is the level ``spin``. It tilts the work where it has two axes and the weld keeps away from its table
+    axis; slope and rotation are left out where it cannot (:func:`~.tilting.may_tilt`). Torches held by angles tilt
+    besides.
 
     Raises:
         OptionError: no such level, or the cell states no freedom.
@@ -59,7 +62,8 @@ def _angles(cell: Cell, freedom: Freedom, name: str) -> list[FreeAngle]:
         return [FreeAngle(f"spin.{robot}", lower, upper) for robot, _ in torches]
     if name in ("travel", "work"):
         return [FreeAngle(f"{name}.{robot}", lower, upper) for robot, torch in torches if torch.angles is not None]
-    return [] if cell.positioner else [FreeAngle(name, lower, upper)]
+    carried = cell.positioner is None or (name in TILTS and may_tilt(cell, freedom))
+    return [FreeAngle(name, lower, upper)] if carried else []
 
 
 def turned_work(T_P_C: Frame, R_P_p: ca.SX | None, angles: dict[str, ca.SX]) -> Frame:

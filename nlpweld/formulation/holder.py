@@ -26,11 +26,13 @@ class Held:
     Attributes:
         T_P_C: workpiece poses in the placement frame, shape (M, 4, 4).
         q: joints of the positioner, shape (M, n) [rad], or None where there is none.
+        branch: k of the positioner's inverse at each point, shape (M,), or None where there is none.
         ends_P: ends of the positioner's bodies in the placement frame, shape (M, b, 2, 3) [m].
     """
 
     T_P_C: np.ndarray
     q: np.ndarray | None
+    branch: np.ndarray | None
     ends_P: np.ndarray
 
 
@@ -44,15 +46,15 @@ def held(cell: Cell, s: np.ndarray) -> Held:
     if cell.positioner is None:
         T_P_C = np.tile(np.eye(4), (len(s), 1, 1))
         T_P_C[:, :3, :3] = flat(frames.normal_C)
-        return Held(T_P_C, None, np.empty((len(s), 0, 2, 3)))
+        return Held(T_P_C, None, None, np.empty((len(s), 0, 2, 3)))
     positioner = cell.positioner
     T_P_B = rpy_pose(positioner.base_position_m, positioner.base_rpy_deg)
     T_T_C = rpy_pose(positioner.mount_position_m, positioner.mount_rpy_deg)
     upright_C = posture_frames(cell, s)[:, :, 2]
     up_B, closed = up_in_base(T_P_B[:3, :3]), cell.seam.closed
-    q = follow(positioner.robot, upright_C @ T_T_C[:3, :3].T, up_B, closed=closed).q
-    T_P_L = T_P_B @ link_poses(positioner.robot, q)
-    return Held(T_P_L[:, -1] @ T_T_C, q, _ends(positioner, T_P_L))
+    path = follow(positioner.robot, upright_C @ T_T_C[:3, :3].T, up_B, closed=closed)
+    T_P_L = T_P_B @ link_poses(positioner.robot, path.q)
+    return Held(T_P_L[:, -1] @ T_T_C, path.q, path.branch, _ends(positioner, T_P_L))
 
 
 def posture_frames(cell: Cell, s: np.ndarray) -> np.ndarray:

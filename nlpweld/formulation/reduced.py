@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from nlpweld.cell.cell import Cell
+from nlpweld.cell.task import Positioner
 from nlpweld.formulation.batch import CONSTRAINTS, Batch
 from nlpweld.formulation.holder import held
 from nlpweld.formulation.margins import with_margins
@@ -13,6 +14,7 @@ from nlpweld.formulation.nlp import Nlp, Relaxation
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, on_wrist, settle
 from nlpweld.formulation.smooth import Gaps, near_gaps, relaxation
 from nlpweld.formulation.stage import Stage
+from nlpweld.formulation.tilting import tilted_path
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import WRIST, signs
 from nlpweld.plan import Plan
@@ -124,10 +126,17 @@ class Unpacker:
             paths[station.name] = q[0, :, : lanes.shape[2]].T
             branches[station.name] = (shoulder, elbow, wrist)
         s, placement = seam_parameters(cell), cell.placement(x)
-        turned = held(cell, s).q
-        if cell.positioner and turned is not None:
-            paths[cell.positioner.name] = turned
+        if cell.positioner:
+            paths[cell.positioner.name] = self._turned(cell.positioner, held(cell, s).q)
         return Plan(cell, placement[:3], s, paths, branches, float(placement[3]))
+
+    def _turned(self, positioner: Positioner, q: np.ndarray | None) -> np.ndarray:
+        """Return the positioner's joints at the seam points, shape (N, n) [rad]."""
+        assert q is not None
+        if self.stage is None or self.stage.table is None or self.points is None:
+            return q
+        cos_sin = self.stage.table.map(self.points.shape[1])(self.points)[0]
+        return tilted_path(positioner.robot, np.array(cos_sin), q)
 
     def _solve(self, k: int, x: np.ndarray, branch: tuple[str, str]) -> tuple[np.ndarray, np.ndarray]:
         """Return cosines and sines (12, N) and reach (N,) of station k by the CasADi graph itself."""

@@ -18,13 +18,16 @@ from nlpweld.formulation.coded import Assembly, Coding, Piece
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.derivatives import by_functions, lanes_of
 from nlpweld.formulation.freedom import free_angles
+from nlpweld.formulation.holder import held
 from nlpweld.formulation.margins import with_margins
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
+from nlpweld.formulation.paths import limit_margins
 from nlpweld.formulation.reduced import OutOfReach, Unpacker
 from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps, step_function, term_function
 from nlpweld.formulation.splines import basis
 from nlpweld.formulation.stage import Stage
 from nlpweld.formulation.staged import Staged
+from nlpweld.formulation.tilting import tilted_path, way_back
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import signs
 from nlpweld.plan import Plan
@@ -32,6 +35,7 @@ from nlpweld.plan import Plan
 REDUNDANT = {"spin": "redundant_spin", "spin_yaw": "redundant_spin_yaw", "spin_yaw_tilt": "redundant"}
 CONTROL_POINTS = 24
 TURNS = 32  # angles that are screened, a divisor of SAMPLES
+LIMITS = CONSTRAINTS.index("joint_limit")
 STEP_MARGIN_DEG = 0.05  # by which solvers stay under the bound on joint steps
 
 
@@ -127,6 +131,15 @@ class Redundant:
         return Screening(Z, np.concatenate(kept))
 
     @cached_property
+    def _untilted(self) -> np.ndarray | None:
+        """The positioner's joints while nothing is tilted, shape (N, n) [rad]."""
+        return held(self.cell, seam_parameters(self.cell)).q
+
+    @cached_property
+    def _table(self) -> ca.Function | None:
+        return self.stage.table.map(self.data.shape[1]) if self.stage.table else None
+
+    @cached_property
     def _grips(self) -> list[ca.Function]:
         return [grip.map(self.data.shape[1]) for grip in self.stage.grips]
 
@@ -156,14 +169,28 @@ class Redundant:
         found = self._evaluator.at(points).evaluate(x[None])
         longest = self._longest_step(x, points, int(found.mode[0])) if np.isfinite(found.objective[0]) else 0.0
         missed = max(0.0, longest - self.bound + np.radians(STEP_MARGIN_DEG)) / np.pi
-        return Evaluation(found.objective, np.hstack([found.violation, [[missed]]]), found.mode)
+        violation = np.hstack([found.violation, [[missed]]])
+        violation[0, LIMITS] = max(violation[0, LIMITS], self._missed_by_table(points))
+        return Evaluation(found.objective, violation, found.mode)
+
+    def _missed_by_table(self, points: np.ndarray) -> float:
+        """Return by how many half turns a positioner that tilts the weld misses its joint limits, the way back too."""
+        if self.cell.positioner is None or self._table is None or self._untilted is None:
+            return 0.0
+        robot, need = self.cell.positioner.robot, np.radians(self.cell.constraints.joint_margin_deg)
+        q = tilted_path(robot, np.array(self._table(points)[0]), self._untilted)
+        whole = np.vstack([q, way_back(q)]) if self.cell.seam.closed else q
+        return max(0.0, float(need - limit_margins(robot, whole.T).min())) / np.pi
 
     def _longest_step(self, x: np.ndarray, points: np.ndarray, mode: int) -> float:
         """Return the farthest any joint turns from one seam point to the next, the way back included [rad]."""
-        n, longest = points.shape[1], 0.0
+        n, longest, found = points.shape[1], 0.0, []
         for grip, branch in zip(self._grips, self.batch.modes[mode], strict=True):
             side = np.reshape(signs((*branch, "noflip")), (3, 1))
-            cos_sin = np.array(grip(np.tile(x[:, None], n), points, np.tile(side, n))[0])
+            found.append(grip(np.tile(x[:, None], n), points, np.tile(side, n))[0])
+        if self._table:
+            found.append(self._table(points)[0])
+        for cos_sin in map(np.array, found):
             phase = cos_sin[:, ::2] + 1j * cos_sin[:, 1::2]
             turned = np.roll(phase, -1, axis=1) * phase.conj()
             longest = max(longest, float(np.abs(np.angle(turned[:, : n if self.cell.seam.closed else n - 1])).max()))

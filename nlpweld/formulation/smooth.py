@@ -92,6 +92,8 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
     z, data, x, point = _variables(stage)
     arms = [arm(x, point, _branch(b)) for arm, b in zip(stage.arms, mode, strict=True)]
     constraints = [g for k in range(len(arms)) for g in _robot_constraints(cell, k, arms[k])]
+    if stage.table:
+        constraints.append(stage.table(point)[1])
     ends = [*(arm[4] for arm in arms), stage.work(x, point)]
     constraints.append((chosen_gaps(stage, gaps, ends) - cell.constraints.clearance_at_points_m) / GAP_SCALE_M)
     tight, reading = cell.tight, cell.objective.reading
@@ -116,10 +118,12 @@ def step_function(stage: Stage, mode: Mode, bound: float) -> ca.Function:
         ca.SX.sym("following", data.shape),
         ca.SX.sym("sharpness"),
     )
-    gaps = []
+    both, pairs = (point, ca.vertcat(following, u)), []
     for grip, branch in zip(stage.grips, mode, strict=True):
-        here, there = (grip(x, p, _branch(branch))[0] for p in (point, ca.vertcat(following, u)))
-        gaps.append((ca.sum2(here * there) - np.cos(bound)) / (1 - np.cos(bound)))
+        pairs.append([grip(x, p, _branch(branch))[0] for p in both])
+    if stage.table:
+        pairs.append([stage.table(p)[0] for p in both])
+    gaps = [(ca.sum2(here * there) - np.cos(bound)) / (1 - np.cos(bound)) for here, there in pairs]
     penalty = STEP_WEIGHT * softened(gaps, sharpness)
     inputs = [ca.vertcat(z, u), ca.vertcat(data, following), sharpness]
     return ca.Function("step", inputs, [penalty], {"cse": True})

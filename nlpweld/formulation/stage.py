@@ -82,6 +82,18 @@ class Stage:
         ends += [T_W_P.point(p) for p in self._positioner_ends(point.ends_P)]
         return _function("work", [x, point.vector], [ca.horzcat(*ends)], ["x", "point"], ["ends"])
 
+    @cached_property
+    def table(self) -> ca.Function | None:
+        """``(point) -> cos_sin (2, 2), kept`` of a positioner that tilts the weld by free angles; None of any other.
+
+        What is kept is at least 0 where its joints are within limits; see :class:`~.tilting.TiltedTable`.
+        """
+        point = weld_point(self.cell, self.free)
+        if point.table is None:
+            return None
+        outputs = [ca.horzcat(point.table.cos, point.table.sin), point.table.kept]
+        return _function("table", [point.vector], outputs, ["point"], ["cos_sin", "kept"])
+
     def _positioner_ends(self, moving_P: ca.SX) -> list[ca.SX]:
         """Return the ends of the positioner's bodies in {P}: numbers where the body is fixed, else as given."""
         if self.cell.positioner is None:

@@ -124,6 +124,22 @@ class TwoAxes:
         theta = np.stack([self.tilt(e_T, up_B, theta2), theta2], axis=-1) - self.offset
         return np.pi - (np.pi - theta) % (2 * np.pi)
 
+    def room(self, e_T: np.ndarray, up_B: np.ndarray) -> np.ndarray:
+        """Return how far directions are inside what can be brought upright, shape (M,) [rad]; negative out of reach.
+
+        That is what stands between two angles off the table axis, by the triangle of both axes and upright; 0 and 180
+        degrees where axis 1 is level and square to axis 2. At either both branches meet and joints turn ever faster.
+
+        Args:
+            e_T: unit directions in the table frame, shape (M, 3).
+            up_B: unit upright direction in the base frame, shape (3,).
+        """
+        e = _about_x(self.alpha[1], e_T)
+        off = np.arctan2(np.hypot(e[:, 0], e[:, 1]), e[:, 2])
+        between = np.arccos(np.cos(self.alpha[0]))
+        up = np.arctan2(np.hypot(up_B[0], up_B[1]), up_B[2])
+        return np.minimum(off - abs(between - up), np.pi - abs(np.pi - between - up) - off)
+
     def solve(self, e_T: ca.SX, up_B: ca.SX, branch: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Return cosines and sines of the DH angles, and reach, in CasADi, free of trigonometry.
 

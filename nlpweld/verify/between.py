@@ -38,7 +38,7 @@ class Jump:
 class Unclosed:
     """A place between two points where no configuration near them reaches the pose the weld asks for.
 
-    Of the positioner, ``rotation_rad`` is how far from upright it leaves the weld.
+    Of the positioner, ``rotation_rad`` is how far from upright, or from the tilt asked, it leaves the weld.
     """
 
     robot: str
@@ -194,7 +194,7 @@ def _closed(
     found, bad, table = {}, [], None
     if cell.positioner is not None:
         name = cell.positioner.name
-        table, off = turn_upright(cell, placement, s, start[name])
+        table, off = turn_upright(cell, placement, s, start[name], free)
         found[name] = table
         bad += [Unclosed(name, float(s[i]), 0.0, float(off[i])) for i in np.flatnonzero(~(off <= posture_limit(cell)))]
     for station in cell.stations:

@@ -67,7 +67,7 @@ def _report(plan: Plan, scene: Scene, measures: Measures, violations: tuple[Viol
         closest_pair=scene.table.pair_labels[pair],
         closest_s=float(plan.s[point]),
         joint_margin_rad=min(float(m.min()) for m in scene.joint_margin.values()),
-        joint_step_rad=max(float(steps.max()) for steps in joint_steps(plan.cell, plan.paths).values()),
+        joint_step_rad=max(float(steps.max()) for steps in joint_steps(plan).values()),
         closure_m=max(float(e[0].max()) for e in scene.closure.values()),
         closure_rad=max(float(e[1].max()) for e in scene.closure.values()),
         posture_rad=float(scene.off_upright.max()),

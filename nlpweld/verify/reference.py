@@ -153,7 +153,7 @@ def workpiece_pose(
         placement: of {P} in W, shape (3,) or (4,) [m; rad].
         s: seam parameter, shape (M,); of no account where there is a positioner.
         table: joint angles of the positioner, shape (M, n) [rad], where there is one.
-        free: offsets of free angles; a positioner leaves the workpiece none.
+        free: offsets of free angles; those of a workpiece on a positioner are in the positioner's joints.
     """
     if cell.positioner is not None:
         assert table is not None

@@ -112,10 +112,11 @@ class Report:
         closest_pair: the two bodies of that pair.
         closest_s: where on the seam.
         joint_margin_rad: least distance of any joint, the positioner's too, from a limit; negative is beyond.
-        joint_step_rad: farthest any robot's joint turns from one point to the next, a closed seam's way back included.
+        joint_step_rad: farthest any robot's joint turns from one point to the next, a closed seam's way back included;
+            the positioner's too where the plan tilts the weld.
         closure_m: largest position error of any TCP at the points.
         closure_rad: largest rotation error of any TCP at the points.
-        posture_rad: how far the positioner is from holding the weld upright; 0 without a positioner.
+        posture_rad: how far the positioner is from holding the weld upright, or tilted as the plan says; 0 without one.
         samples: number of configurations looked at.
         feasible: no violation.
         violations: worst first, one for each constraint, robot or pair, and joint.
@@ -219,7 +220,7 @@ class Report:
         lines.append(f"  joint margin      {math.degrees(self.joint_margin_rad):.3f} deg")
         lines.append(f"  joint step        {math.degrees(self.joint_step_rad):.3f} deg")
         if self.posture_rad:
-            lines.append(f"  posture           {self.posture_rad:.1e} rad from upright")
+            lines.append(f"  posture           {self.posture_rad:.1e} rad from the posture asked")
         closure = f"{self.closure_m:.1e} m, {self.closure_rad:.1e} rad"
         return [*lines, f"  closure           {closure}; {self.samples} configurations"]
 

@@ -34,6 +34,7 @@ def violations(plan: Plan, scene: Scene) -> list[Violation]:
         *singularity(plan, scene),
         *clearance(plan, scene),
         *freedom(plan),
+        *tilt(plan, scene),
         *joint_step(plan),
     ]
 
@@ -81,7 +82,10 @@ def closure(plan: Plan, scene: Scene) -> Iterator[Violation]:
 
 
 def posture(plan: Plan, scene: Scene) -> Iterator[Violation]:
-    """The positioner holds the main seam's weld upright (Zhang et al., eq. 7, 8), at the points and between them."""
+    """The positioner holds the main seam's weld upright (Zhang et al., eq. 7, 8), or tilted as the plan says.
+
+    At the points and between them.
+    """
     if plan.cell.positioner is None:
         return
     name, limit = plan.cell.positioner.name, posture_limit(plan.cell)
@@ -92,7 +96,7 @@ def posture(plan: Plan, scene: Scene) -> Iterator[Violation]:
     for gap in scene.motion.unclosed:
         if gap.robot == name:
             point, s = _nearest(plan, gap.s)
-            note = "no joints between the neighbours hold the weld upright"
+            note = "no joints between the neighbours hold the weld upright, or tilted as the plan says"
             yield Violation("posture", name, point, gap.rotation_rad, limit, s=s, unit="rad", note=note)
 
 
@@ -180,6 +184,25 @@ def freedom(plan: Plan) -> Iterator[Violation]:
         yield from _held(plan, station)
 
 
+def tilt(plan: Plan, scene: Scene) -> Iterator[Violation]:
+    """Where a plan tilts a weld that a positioner holds, it is the joints that keep the bands, along the whole seam.
+
+    Slope and rotation are read off the joints; that they are those of the plan is for :func:`posture` to say.
+    """
+    if plan.cell.freedom is None or not set(scene.tilt) & set(plan.freedom or {}):
+        return
+    for name, angle in scene.tilt.items():
+        band = np.radians(getattr(plan.cell.freedom, f"{name}_deg"))
+        beyond = np.maximum(band[0] - angle, angle - band[1])
+        k = int(beyond.argmax())
+        if not beyond[k] <= WITHIN:
+            value, limit = float(angle[k]), float(band[int(angle[k] > band[1])])
+            point, s = _place(plan, scene, k)
+            note = f"{np.degrees(value):.2f} deg off the position, by the positioner's joints"
+            owner = plan.cell.positioner.name if plan.cell.positioner else None
+            yield Violation("freedom", owner, point, value, limit, s=s, joint=name, unit="rad", note=note)
+
+
 def _held(plan: Plan, station: Station) -> Iterator[Violation]:
     """A torch's travel and work angle, as much as they leave a right angle, do so by no more than one together."""
     held, free = getattr(station.coupling, "angles", None), plan.freedom or {}
@@ -197,11 +220,14 @@ def _held(plan: Plan, station: Station) -> Iterator[Violation]:
 
 
 def joint_step(plan: Plan) -> Iterator[Violation]:
-    """No joint of a robot turns farther from one point to the next than a cell with freedom allows."""
+    """No joint of a robot turns farther from one point to the next than a cell with freedom allows.
+
+    Nor does one of the positioner where the plan tilts the weld.
+    """
     if plan.freedom is None or plan.cell.freedom is None:
         return
     limit = float(np.radians(plan.cell.freedom.joint_step_deg))
-    for name, steps in joint_steps(plan.cell, plan.paths).items():
+    for name, steps in joint_steps(plan).items():
         for joint in np.flatnonzero(~(steps.max(axis=0) <= limit + WITHIN)):
             k = int(steps[:, joint].argmax())
             value, s = float(steps[k, joint]), float(plan.s[k])

@@ -12,6 +12,7 @@ from nlpweld.formulation.splines import basis
 from nlpweld.geometry.seam import seam_parameters, weld_frames
 from nlpweld.geometry.weld_angles import weld_angles, weld_rotations
 from nlpweld.solvers import Budget, make_solver
+from nlpweld.verify import verify
 
 PAPER = np.array([0.023, -0.266, 0.404])
 CELLS = ("three_er16", "dual_welder_positioner", "robot_positioner")
@@ -132,15 +133,27 @@ def test_starts_keep_their_angles_along_the_seam_and_differ_by_seed(cell: Cell) 
     assert (own.starts(4, 16) != Z).any()
 
 
-def test_positioner_leaves_no_yaw_and_torches_tilt_instead() -> None:
+def test_positioner_leaves_no_yaw_and_torches_tilt_besides() -> None:
     cell = load_cell("dual_welder_positioner")
     assert [a.name for a in free_angles(cell, "spin_yaw")] == ["spin.robot_1", "spin.robot_2"]
     assert [a.name for a in free_angles(cell, "spin_yaw_tilt")][2:] == [
+        "slope",
+        "rotation",
         "travel.robot_1",
         "travel.robot_2",
         "work.robot_1",
         "work.robot_2",
     ]
+
+
+def test_tilt_on_a_positioner_gains_over_the_best_without() -> None:
+    """Without slope and rotation the best is 0.6097."""
+    coarse = load_cell("robot_positioner").with_(seam={"points": 18}, freedom={"joint_step_deg": 60.0})
+    nlp = redundant(coarse, "numpy", controls=6)
+    found = make_solver("ipopt").solve(nlp, seed=0, budget=Budget())
+    assert found.status == "SOLVED"
+    assert found.objective > 1.02 * 0.6097
+    assert verify(nlp.unpack(found.x, found.mode)).feasible
 
 
 def test_cell_without_freedom_and_unknown_level_are_named(cell: Cell) -> None:

@@ -166,6 +166,21 @@ def test_graph_comes_as_near_as_the_arrays_where_upright_is_out_of_reach_and_say
     assert np.hypot(cos, sin) == pytest.approx([1, 1], abs=1e-14)
 
 
+@K
+@pytest.mark.parametrize("rpy", [(-90.0, 0.0, 0.0), (-60.0, 0.0, 0.0), (-130.0, -20.0, 0.0)])
+@pytest.mark.parametrize("robot", [ZHANG, oblique(), oblique(130.0)], ids=["zhang", "oblique", "obtuse"])
+def test_room_is_what_is_left_before_upright_is_out_of_reach(k: int, rpy: tuple[float, ...], robot: Robot) -> None:
+    up = up_in_base(rpy_pose((0.0, 0.0, 0.0), rpy)[:3, :3])  # type: ignore[arg-type]
+    e = directions(seed=10, m=2000)
+    room = two_axes(robot).room(e, up)
+    remaining = off_upright(robot, two_axes(robot).joints(e, up, k), e, up)
+    assert remaining == pytest.approx(np.maximum(0.0, -room), abs=1e-9)
+    both = [two_axes(robot).joints(e, up, j) for j in (0, 1)]
+    apart = np.abs(np.angle(np.exp(1j * (both[0] - both[1])))).max(axis=1)
+    assert (apart[room < -1e-9] < 1e-9).all()
+    assert (apart[room > 1e-2] > 1e-2).all()
+
+
 def turned_rotator() -> Robot:
     """Return a rotator with an offset, an arm and a twist."""
     joint = Joint(a_m=0.1, d_m=0.2, alpha_deg=30.0, offset_deg=50.0, lower_deg=-360.0, upper_deg=360.0)

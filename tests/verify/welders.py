@@ -77,13 +77,19 @@ def joints(robot: Robot, R: np.ndarray, p: np.ndarray) -> np.ndarray:
 
 
 def plan(cell: Cell, at: tuple[float, float], off: float = 0.0, freedom: dict[str, np.ndarray] | None = None) -> Plan:
-    """Return the plan of one of the two cells with PB at (x, y) [m], the tilt axis off by an angle [rad]."""
+    """Return the plan of one of the two cells with PB at (x, y) [m], the tilt axis off by an angle [rad].
+
+    What is to be upright is tilted by slope and rotation, written out along tangent, across and up.
+    """
     dual, n = cell.name == "dual_welder_positioner", cell.seam.points
     s = np.linspace(0, 1, n) if dual else np.arange(n) / n
     seams = {"main": trough(s, 1), "second": trough(s, -1)} if dual else {"main": flange(s)}
     mount = np.array([0.15, 0, 0.55 + TABLE] if dual else [0.10, 0, 0.05 + TABLE])
     R_T_C = rot("Z", np.pi)
-    theta = table_angles(turned(R_T_C, seams["main"][2]))
+    t, up = seams["main"][1][..., 0], seams["main"][2]
+    slope, rotation = ((freedom or {}).get(a, np.zeros(n))[:, None] for a in ("slope", "rotation"))
+    level = np.cos(rotation) * up + np.sin(rotation) * np.cross(up, t)
+    theta = table_angles(turned(R_T_C, np.cos(slope) * level + np.sin(slope) * t))
     theta[:, 0] += off
     R_W_T = rot("YXZ", theta[:, 0], np.pi, theta[:, 1])
     R_W_C, c = R_W_T @ R_T_C, np.array([*at, HEIGHT]) + turned(R_W_T, mount)
