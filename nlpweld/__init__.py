@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from nlpweld.bench.compare import compare
     from nlpweld.cell import Cell, load_cell, load_positioner, load_robot
     from nlpweld.errors import NlpweldError
-    from nlpweld.formulation.full import full
+    from nlpweld.formulation.full import full, full_start
+    from nlpweld.formulation.full_redundant import full_redundant
     from nlpweld.formulation.reduced import reduced
     from nlpweld.formulation.redundant import redundant
     from nlpweld.plan import Plan, load_plan
@@ -33,6 +34,8 @@ _HOMES = {
     "evaluate": "bench.answer",
     "formulate": "bench.answer",
     "full": "formulation.full",
+    "full_redundant": "formulation.full_redundant",
+    "full_start": "formulation.full",
     "load_cell": "cell",
     "load_plan": "plan",
     "load_positioner": "cell",
@@ -55,6 +58,8 @@ __all__ = [
     "evaluate",
     "formulate",
     "full",
+    "full_redundant",
+    "full_start",
     "load_cell",
     "load_plan",
     "load_positioner",

@@ -12,6 +12,7 @@ from nlpweld.bench.margins import ROUNDS, wider
 from nlpweld.cell.cell import Cell
 from nlpweld.errors import OptionError
 from nlpweld.formulation.full import full
+from nlpweld.formulation.full_redundant import FULL_REDUNDANT, full_redundant
 from nlpweld.formulation.nlp import Nlp
 from nlpweld.formulation.reduced import OutOfReach, reduced
 from nlpweld.formulation.redundant import REDUNDANT, redundant
@@ -24,6 +25,7 @@ FORMULATIONS: dict[str, Callable[[Cell, str], Nlp]] = {
     "reduced": reduced,
     "full": full,
     **{name: partial(redundant, level=level) for level, name in REDUNDANT.items()},
+    **{name: partial(full_redundant, level=level) for level, name in FULL_REDUNDANT.items()},
 }
 
 

@@ -2,7 +2,8 @@
 
 A point's function is differentiated once, symbolically, in its few variables, and mapped over the points. What comes
 out is scattered into one sparse matrix, whose only full rows and columns are those of the shared variables. So
-evaluation, memory and factorisation grow in proportion to the number of points.
+evaluation, memory and factorisation grow in proportion to the number of points. What neighbouring points may differ by
+adds entries between a variable and the same of the next point, and as few.
 """
 
 from dataclasses import dataclass
@@ -48,7 +49,33 @@ class Arrow:
         return np.where(index < self.shared, index, index + self.own * np.arange(self.points)[:, None])
 
 
-def arrow_relaxation(term: ca.Function, closure: ca.Function, arrow: Arrow, engine: str = "numpy") -> Relaxation:
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """A cost of how far each of some variables goes from one point to the next.
+
+    Attributes:
+        cost: ``(difference, sharpness) -> scalar``, of one variable.
+        count: the first so many of a point's own variables.
+        closed: whether the last point is followed by the first.
+    """
+
+    cost: ca.Function
+    count: int
+    closed: bool
+
+    def differences(self, arrow: Arrow) -> ca.DM:
+        """Return the sparse matrix (m, n) that takes all variables to their steps, point by point."""
+        here = arrow.placed(arrow.shared + np.arange(self.count))
+        ahead = np.roll(here, -1, axis=0)
+        ends = [place[: None if self.closed else -1].ravel() for place in (here, ahead)]
+        rows, m = np.tile(np.arange(len(ends[0])), 2).tolist(), len(ends[0])
+        signs = np.repeat([-1.0, 1.0], m)
+        return ca.DM.triplet(rows, np.concatenate(ends).tolist(), ca.DM(signs), m, arrow.size)
+
+
+def arrow_relaxation(
+    term: ca.Function, closure: ca.Function, arrow: Arrow, engine: str = "numpy", steps: Steps | None = None
+) -> Relaxation:
     """Return ``sum_j term(y_j, point_j, sharpness)`` under ``closure(y_j, point_j) == 0``, with sparse derivatives.
 
     Args:
@@ -56,15 +83,18 @@ def arrow_relaxation(term: ca.Function, closure: ca.Function, arrow: Arrow, engi
         closure: ``(y, point) -> (m, 1)``.
         arrow: how the y_j make up all variables.
         engine: ``c`` compiles what CasADi differentiates; all others run it in CasADi's own machine.
+        steps: what the steps from point to point cost besides, if anything.
     """
     z, p, lam_f = ca.MX.sym("z", arrow.size), ca.MX.sym("sharpness"), ca.MX.sym("lam_f")
     lam_g = ca.MX.sym("lam_g", closure.numel_out(0) * arrow.points)
     slope, jacobian, curve = _derivatives(term, closure)
-    hessian = _curvature(curve, arrow, z, p, lam_f, lam_g)
+    cost, inclined, bent = _stepped(steps, arrow, z, p)
+    alone = _curvature(curve, arrow, z, p, ca.MX(1), ca.MX.zeros(lam_g.numel())) + bent
+    hessian = _curvature(curve, arrow, z, p, lam_f, lam_g) + lam_f * bent
     functions = [
-        ca.Function("value", [z, p], [ca.sum2(_mapped(term, arrow, z, p))]),
-        ca.Function("gradient", [z, p], [_gradient(slope, arrow, z, p)]),
-        ca.Function("hessian", [z, p], [_symmetric(curve, arrow, z, p, lam_g.numel())]),
+        ca.Function("value", [z, p], [ca.sum2(_mapped(term, arrow, z, p)) + cost]),
+        ca.Function("gradient", [z, p], [_gradient(slope, arrow, z, p) + inclined]),
+        ca.Function("hessian", [z, p], [ca.triu2symm(alone)]),
         ca.Function("closure", [z], [ca.vec(_mapped(closure, arrow, z))]),
         ca.Function("jacobian", [z], [_jacobian(jacobian, closure, arrow, z)]),
         ca.Function("lagrangian", [z, p, lam_f, lam_g], [hessian]),
@@ -132,9 +162,17 @@ def _curvature(curve: Entries, arrow: Arrow, z: ca.MX, p: ca.MX, lam_f: ca.MX, l
     return _sparse((arrow.size, arrow.size), rows, columns, ca.vertcat(summed, scattered))
 
 
-def _symmetric(curve: Entries, arrow: Arrow, z: ca.MX, p: ca.MX, multipliers: int) -> ca.MX:
-    """Return the whole Hessian of the value alone."""
-    return ca.triu2symm(_curvature(curve, arrow, z, p, ca.MX(1), ca.MX.zeros(multipliers)))
+def _stepped(steps: Steps | None, arrow: Arrow, z: ca.MX, p: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+    """Return what all steps cost, its gradient (n, 1), and the upper triangle of its Hessian (n, n), sparse."""
+    if steps is None:
+        return ca.MX(1, 1), ca.MX(arrow.size, 1), ca.MX(arrow.size, arrow.size)
+    one, sharpness = (ca.SX.sym(steps.cost.name_in(i)) for i in range(2))
+    curve, slope = ca.hessian(steps.cost(one, sharpness), one)
+    jet = ca.Function("step", [one, sharpness], [steps.cost(one, sharpness), slope, curve], {"cse": True})
+    D = ca.MX(steps.differences(arrow))
+    m = D.shape[0]
+    cost, slopes, curves = jet.map(m)((D @ z).T, ca.repmat(p, 1, m))
+    return ca.sum2(cost), D.T @ slopes.T, ca.triu(D.T @ (ca.diag(curves.T) @ D))
 
 
 def _sparse(shape: tuple[int, int], rows: np.ndarray, columns: np.ndarray, values: ca.MX) -> ca.MX:

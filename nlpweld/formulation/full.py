@@ -4,13 +4,15 @@ Nothing is inverted: that each chain closes on the weld is an equality at every 
 The problem is large but sparse, for seam points share nothing but the placement, so work grows in proportion to them.
 
 Variables are the placement's coordinates [m; rad], then seam point after seam point the joints of all stations in
-their order [rad], in DH direction. A positioner is the master: its joints follow from the seam alone and are none.
+their order [rad], in DH direction, and the point's free angles, if any (:mod:`~.full_redundant`). A positioner is the
+master: its joints follow from the seam alone and are none.
 
 Branches are no choice here: shoulder, elbow and wrist are the signs of the three factors of |det J|, which a descent
 inherits from its start. Changing one means to pass |det J| = 0, and the penalty under the singularity floor stands
 before that. It is a penalty at the seam's points, not a wall, so the exact model counts points on a wrong side.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -18,15 +20,17 @@ import casadi as ca
 import numpy as np
 
 from nlpweld.cell.cell import Cell
-from nlpweld.formulation.arrow import Arrow, arrow_relaxation
+from nlpweld.errors import OptionError
+from nlpweld.formulation.arrow import Arrow, Steps, arrow_relaxation
 from nlpweld.formulation.batch import Batch
+from nlpweld.formulation.freedom import FreeAngle, free_angles
 from nlpweld.formulation.holder import held
 from nlpweld.formulation.margins import with_margins
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, limit_margins, on_wrist, settle
 from nlpweld.formulation.seam_point import JOINTS, LEVER_M, SeamPoint, closure_function, facts_function, full_term
 from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps
-from nlpweld.formulation.stage import GAP_SCALE_M
+from nlpweld.formulation.stage import GAP_SCALE_M, Stage
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import ELBOW, SHOULDER, WRIST, signs
 from nlpweld.plan import Plan
@@ -36,6 +40,7 @@ CLOSED = 1e-7  # by how much a chain may be open at a point [m; rad]; a tenth of
 HAIR = 1e-9  # by which bounds of joints lie inside their limits, so that rounding keeps the margin [rad]
 SCOUTS = 256  # random placements of which the best are started from
 NEAREST = 32  # scouts that tell which bodies come near each other
+NEAR_M = 0.2  # and what is near
 SIDES = (SHOULDER, ELBOW, WRIST)
 
 
@@ -50,30 +55,29 @@ def full(cell: Cell, engine: str = "auto") -> Nlp:
     Raises:
         KinematicsError: a robot has no closed-form inverse, which starts and |det J| need.
     """
-    form = Full(Batch(cell, engine))
-    lower, upper = form.bounds
-    return Nlp(
-        problem=cell.name,
-        formulation="full",
-        names=form.names,
-        lower=lower,
-        upper=upper,
-        constraints=CONSTRAINTS,
-        evaluate=form.evaluate,
-        unpack=form.unpack,
-        relax=form.relax,
-        n_modes=len(form.batch.modes),
-        widened=lambda extra: full(with_margins(cell, extra), engine),
-        sample=form.starts,
-        prepare=form.prepare,
-        rebuild=partial(full, cell, engine),
-    )
+    form, again = Full(Batch(cell, engine)), partial(full, cell, engine)
+    return form.nlp("full", lambda extra: full(with_margins(cell, extra), engine), again)
 
 
-def full_start(plan: Plan) -> np.ndarray:
-    """Return the variables (n,) of a plan of any solver; its points are taken to be its cell's."""
-    joints = np.hstack([plan.paths[station.name] for station in plan.cell.stations])
-    return np.concatenate([plan.cell.coordinates(plan.placement), joints.ravel()])
+def full_start(plan: Plan, level: str | None = None) -> np.ndarray:
+    """Return the variables (n,) of a plan of any solver; its points are taken to be its cell's.
+
+    Args:
+        plan: the plan.
+        level: what the form leaves free, a key of :data:`~.freedom.LEVELS`, or None; what the plan does not name is
+            nominal.
+
+    Raises:
+        OptionError: the plan turns an angle that the form does not free, so that no chain would close.
+    """
+    names = [angle.name for angle in free_angles(plan.cell, level)] if level else []
+    freedom = plan.freedom or {}
+    for name, offsets in freedom.items():
+        if name not in names and np.any(offsets):
+            raise OptionError(f"the plan turns {name}, which the form does not free; take a level that does")
+    angles = [freedom.get(name, np.zeros(len(plan.s)))[:, None] for name in names]
+    own = np.hstack([plan.paths[station.name] for station in plan.cell.stations] + angles)
+    return np.concatenate([plan.cell.coordinates(plan.placement), own.ravel()])
 
 
 @dataclass(frozen=True)
@@ -91,33 +95,79 @@ class Full:
         """The cell."""
         return self.batch.cell
 
+    @property
+    def stage(self) -> Stage:
+        """The graphs."""
+        return self.batch.stage
+
+    @property
+    def data(self) -> np.ndarray:
+        """What is known of the seam points, shape (k, N)."""
+        return self.batch.points
+
+    @property
+    def angles(self) -> tuple[FreeAngle, ...]:
+        """What is free at every seam point besides the joints."""
+        return ()
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """Names of what the exact model looks at."""
+        return CONSTRAINTS
+
+    @property
+    def steps(self) -> Steps | None:
+        """What joint steps from point to point cost in the relaxation."""
+        return None
+
     @cached_property
     def point(self) -> SeamPoint:
         """Expressions of one seam point."""
-        return SeamPoint(self.batch.stage)
+        return SeamPoint(self.stage)
 
     @cached_property
     def arrow(self) -> Arrow:
         """How variables are ordered."""
-        return Arrow(len(self.cell.variables), self.point.own, self.batch.points)
+        return Arrow(len(self.cell.variables), self.point.own, self.data)
 
     @cached_property
     def facts(self) -> ca.Function:
         """What the exact model looks at, at one seam point."""
-        return facts_function(self.point, all_gaps(self.batch.stage))
+        return facts_function(self.point, all_gaps(self.stage))
 
     @property
     def bounds(self) -> np.ndarray:
-        """Bounds of all variables, shape (2, n): the placement's box, then joint limits less the solvers' margin."""
+        """Bounds of all variables, shape (2, n): the placement's box, joint limits less the solvers' margin, bands."""
         need = np.radians(self.cell.constraints.joint_margin_deg) + HAIR
         limits = np.hstack([s.robot.limits_rad.T for s in self.cell.stations]) + np.array([[need], [-need]])
-        return np.concatenate([self.cell.box, np.tile(limits, self.arrow.points)], axis=1)
+        bands = np.array([[a.lower, a.upper] for a in self.angles]).reshape(-1, 2).T
+        return np.hstack([self.cell.box, np.tile(np.hstack([limits, bands]), self.arrow.points)])
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all variables."""
-        joints = [f"{s.name}.J{i + 1}" for s in self.cell.stations for i in range(JOINTS)]
-        return (*self.cell.variables, *(f"{name}[{j}]_rad" for j in range(self.arrow.points) for name in joints))
+        own = [f"{s.name}.J{i + 1}" for s in self.cell.stations for i in range(JOINTS)] + [a.name for a in self.angles]
+        return (*self.cell.variables, *(f"{name}[{j}]_rad" for j in range(self.arrow.points) for name in own))
+
+    def nlp(self, formulation: str, widened: Callable[[dict[str, float]], Nlp], rebuild: Callable[[], Nlp]) -> Nlp:
+        """Return the form as solvers see it, by its name, how margins grow, and how another process builds it."""
+        lower, upper = self.bounds
+        return Nlp(
+            problem=self.cell.name,
+            formulation=formulation,
+            names=self.names,
+            lower=lower,
+            upper=upper,
+            constraints=self.constraints,
+            evaluate=self.evaluate,
+            unpack=self.unpack,
+            relax=self.relax,
+            n_modes=len(self.batch.modes),
+            widened=widened,
+            sample=self.starts,
+            prepare=self.prepare,
+            rebuild=rebuild,
+        )
 
     def prepare(self) -> None:
         """Build and compile what ``evaluate`` and the scouts need."""
@@ -126,8 +176,8 @@ class Full:
 
     def joints(self, Z: np.ndarray) -> np.ndarray:
         """Return joint paths of candidates Z (m, n), shape (m, S, 6, N) [rad]."""
-        own = Z[:, self.arrow.shared :].reshape(len(Z), self.arrow.points, -1, JOINTS)
-        return own.transpose(0, 2, 3, 1)
+        own = Z[:, self.arrow.shared :].reshape(len(Z), self.arrow.points, self.arrow.own)
+        return own[..., : self.point.joints].reshape(*own.shape[:2], -1, JOINTS).transpose(0, 2, 3, 1)
 
     def evaluate(self, Z: np.ndarray) -> Evaluation:
         """Return objective, violations and mode of candidates Z, shape (m, n)."""
@@ -137,23 +187,26 @@ class Full:
         open_by = np.maximum(offset / LEVER_M, turn).max(axis=(1, 2))
         floor, margin = levels.floor_at_points_m3, np.radians(levels.joint_margin_deg)
         step, limit = self._path(q)
-        missed = {
+        missed = self._missed_steps(step) | {
             "closure": open_by - CLOSED,
-            "continuity": (step - np.pi) / np.pi,
             "branch": self._astray(factors),
             "joint_limit": (margin - limit) / np.pi,
             "singularity": (floor - w.min(axis=(1, 2))) / (floor or 1.0),
             "clearance": (levels.clearance_at_points_m - gap.min(axis=(1, 2))) / GAP_SCALE_M,
         }
         mean = mmr.mean(axis=(1, 2))
-        violation = np.maximum(0.0, np.column_stack([missed[name] for name in CONSTRAINTS]))
+        violation = np.maximum(0.0, np.column_stack([missed[name] for name in self.constraints]))
         return Evaluation(np.where(np.isfinite(mean), mean, -np.inf), violation, self._modes(factors))
+
+    def _missed_steps(self, longest: np.ndarray) -> dict[str, np.ndarray]:
+        """Return by how many half turns joints' longest steps (m,) [rad] are too long."""
+        return {"continuity": (longest - np.pi) / np.pi}
 
     def _judged(self, Z: np.ndarray) -> list[np.ndarray]:
         """Return the facts of every candidate, each of shape (m, N, entries); factors station by station."""
         m, n, d = len(Z), self.arrow.points, self.arrow.shared
         Y = np.hstack([np.repeat(Z[:, :d], n, axis=0), Z[:, d:].reshape(m * n, -1)])
-        found = self.facts.map(m * n)(Y.T, np.tile(self.batch.points, m))
+        found = self.facts.map(m * n)(Y.T, np.tile(self.data, m))
         return [np.array(fact).T.reshape(m, n, -1) for fact in found]
 
     def _settled(self, q: np.ndarray) -> np.ndarray:
@@ -222,16 +275,18 @@ class Full:
         best = np.lexsort((-found.objective, found.total))[:count]
         return np.array([self.start(X[i], int(found.mode[i])) for i in best])
 
-    def start(self, x: np.ndarray, mode: int) -> np.ndarray:
-        """Return variables (n,) of a placement (d,), with joints on a mode's branches."""
-        paths = [self._inverse(k, x, branch) for k, branch in enumerate(self.batch.modes[mode])]
-        return np.concatenate([x, np.concatenate(paths).T.ravel()])
+    def start(self, x: np.ndarray, mode: int, angles: np.ndarray | None = None) -> np.ndarray:
+        """Return variables (n,) of a placement (d,), with joints on a mode's branches and angles (f, N) or nominal."""
+        u = np.zeros((len(self.angles), self.arrow.points)) if angles is None else angles
+        points = np.vstack([self.data, u])
+        paths = [self._inverse(k, x, points, branch) for k, branch in enumerate(self.batch.modes[mode])]
+        return np.concatenate([x, np.vstack([*paths, u]).T.ravel()])
 
     def _scouted(self, seed: int, count: int) -> tuple[np.ndarray, Evaluation]:
         X = sobol(self.cell.box[0], self.cell.box[1], seed, count)
         return X, self.batch.evaluate(X)
 
-    def _inverse(self, k: int, x: np.ndarray, branch: tuple[str, str]) -> np.ndarray:
+    def _inverse(self, k: int, x: np.ndarray, points: np.ndarray, branch: tuple[str, str]) -> np.ndarray:
         """Return station k's joint paths, shape (6, N) [rad].
 
         They are unwrapped, on a wrist that keeps the joint margin if there is one, and as far inside the limits as
@@ -239,7 +294,7 @@ class Full:
         """
         n, robot, closed = self.arrow.points, self.cell.stations[k].robot, self.cell.seam.closed
         side = np.reshape(signs((*branch, "noflip")), (3, 1))
-        out = self.batch.stage.grips[k].map(n)(np.tile(x[:, None], n), self.batch.points, np.tile(side, n))[0]
+        out = self.stage.grips[k].map(n)(np.tile(x[:, None], n), points, np.tile(side, n))[0]
         lanes = np.array(out).reshape(JOINTS, n, 2).transpose(2, 0, 1).reshape(2 * JOINTS, 1, n)
         wrists, need = allowed(self.cell.configuration.wrist, WRIST), np.radians(self.cell.constraints.joint_margin_deg)
         wrist = wrists[best_wrist(Limits.of(robot, closed), lanes, wrists, need)[1][0]]
@@ -247,14 +302,15 @@ class Full:
 
     def relax(self, mode: int, whole: bool = False) -> Relaxation:
         """Return the relaxation, with every distance if whole, else with those that fall near at a mode's scouts."""
-        gaps = all_gaps(self.batch.stage) if whole else self._near(mode)
+        gaps = all_gaps(self.stage) if whole else self._near(mode)
         term = full_term(self.point, gaps, self.arrow.points)
-        return arrow_relaxation(term, closure_function(self.point), self.arrow, self.batch.chosen_engine)
+        return arrow_relaxation(term, closure_function(self.point), self.arrow, self.batch.chosen_engine, self.steps)
 
-    def _near(self, mode: int, within_m: float = 0.2) -> Gaps:
+    def _near(self, mode: int) -> Gaps:
         """Return the distances that fall below a bound at the best scouts of a mode; all, if it has none."""
         X, found = self._scouted(0, SCOUTS)
         order = np.lexsort((-found.objective, found.total))
         X = X[[i for i in order if np.isfinite(found.objective[i]) and found.mode[i] == mode][:NEAREST]]
-        stage = self.batch.stage
-        return near_gaps(stage, self.batch.modes[mode], X, self.batch.points, within_m) if len(X) else all_gaps(stage)
+        if len(X) == 0:
+            return all_gaps(self.stage)
+        return near_gaps(self.stage, self.batch.modes[mode], X, self.data, NEAR_M)

@@ -1,7 +1,8 @@
 """The one type solvers know: named variables in a box, an objective to maximise, and named constraints."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -117,6 +118,20 @@ class Nlp:
         if self.sample:
             return self.sample(seed, count)
         return sobol(self.lower, self.upper, seed, count)
+
+    def started(self, x: np.ndarray) -> "Nlp":
+        """Return the same problem for a descent from x (n,) alone, e.g. another solver's answer; it is not refined.
+
+        It starts there with wider margins too.
+        """
+        start, widened = np.clip(x, self.lower, self.upper), self.widened
+        again = widened and (lambda extra: widened(extra).started(x))
+        built = self.rebuild and partial(_started, self.rebuild, x)
+        return replace(self, sample=lambda seed, count: start[None], widened=again, refine=None, rebuild=built)
+
+
+def _started(rebuild: Callable[[], Nlp], x: np.ndarray) -> Nlp:
+    return rebuild().started(x)
 
 
 def sobol(lower: np.ndarray, upper: np.ndarray, seed: int, count: int) -> np.ndarray:

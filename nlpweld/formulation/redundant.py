@@ -86,7 +86,7 @@ class Redundant:
 
     batch: Batch
     level: str
-    controls: int
+    controls: int = CONTROL_POINTS
 
     @property
     def cell(self) -> Cell:
@@ -231,7 +231,7 @@ class Redundant:
     def relax(self, mode: int, whole: bool = False) -> Relaxation:
         """Return the relaxation on a mode's branches, with every distance if whole."""
         branches, engine, B = self.batch.modes[mode], self.batch.chosen_engine, self.coding.basis
-        gaps = all_gaps(self.stage) if whole else self._near(mode)
+        gaps = all_gaps(self.stage) if whole else self.near(mode)
         term = term_function(self.stage, branches, gaps, self.data.shape[1])
         step = step_function(self.stage, branches, self.bound - np.radians(STEP_MARGIN_DEG))
         ahead = np.roll(np.arange(len(B)), -1)
@@ -244,7 +244,7 @@ class Redundant:
         whole_sum = Assembly(self.coding, pieces)
         return by_functions(whole_sum.value, whole_sum.slopes, len(self.coding.bounds[0]))
 
-    def _near(self, mode: int, scouts: int = 64, within_m: float = 0.3) -> Gaps:
+    def near(self, mode: int, scouts: int = 64, within_m: float = 0.3) -> Gaps:
         """Return the distances that matter at some placements and angles within reach."""
         Z = self.starts(1, 8 * scouts)
         found = self.evaluate(Z)

@@ -1,4 +1,4 @@
-"""One seam point in the full space: placement and every joint are given, and nothing is inverted."""
+"""One seam point in the full space: placement, every joint and any free angles are given, and nothing is inverted."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,42 +18,46 @@ JOINTS = 6  # of every station: what has a closed-form manipulability
 
 @dataclass(frozen=True)
 class SeamPoint:
-    """Expressions of one seam point in its variables y: the placement's coordinates, then all stations' joints.
+    """Expressions of one seam point in its variables y: placement, then all stations' joints, then free angles.
 
     Attributes:
-        stage: the cell's graphs, without free angles.
+        stage: the cell's graphs; its free angles are this point's.
     """
 
     stage: Stage
 
     @property
-    def own(self) -> int:
+    def joints(self) -> int:
         """Number of joints of all stations."""
         return JOINTS * len(self.stage.cell.stations)
 
-    @cached_property
-    def y(self) -> ca.SX:
-        """Variables, shape (d + own, 1) [m; rad]."""
-        return ca.SX.sym("y", len(self.stage.cell.variables) + self.own)
+    @property
+    def own(self) -> int:
+        """Number of the point's own variables: joints and free angles."""
+        return self.joints + len(self.stage.free)
 
     @cached_property
     def weld(self) -> WeldPoint:
-        """What is known of the point."""
-        return weld_point(self.stage.cell)
+        """What is known of the point, and its free angles."""
+        return weld_point(self.stage.cell, self.stage.free)
+
+    @cached_property
+    def _x(self) -> ca.SX:
+        return ca.SX.sym("x", len(self.stage.cell.variables))
+
+    @cached_property
+    def _q(self) -> ca.SX:
+        return ca.SX.sym("q", self.joints)
 
     @property
     def inputs(self) -> list[ca.SX]:
-        """What every graph here takes: variables, and what is known of the point."""
-        return [self.y, self.weld.vector]
-
-    @property
-    def _x(self) -> ca.SX:
-        return self.y[: -self.own]
+        """What every graph here takes: variables y (d + own, 1) [m; rad], and what is known of the point."""
+        return [ca.vertcat(self._x, self._q, self.weld.free), self.weld.data]
 
     @cached_property
     def cos_sin(self) -> list[tuple[ca.SX, ca.SX]]:
         """Cosines and sines of every station's DH angles, shapes (6, 1)."""
-        joints = ca.vertsplit(self.y[-self.own :], JOINTS)
+        joints = ca.vertsplit(self._q, JOINTS)
         return [Chain(s.robot).cos_sin(q) for s, q in zip(self.stage.cell.stations, joints, strict=True)]
 
     @cached_property
@@ -64,10 +68,11 @@ class SeamPoint:
         """
         cell, found = self.stage.cell, []
         T_W_C = placement_frame(cell, self._x) @ self.weld.T_P_C
-        for station, target, (cos, sin) in zip(cell.stations, self.weld.targets, self.cos_sin, strict=True):
+        couplings = zip(cell.stations, self.weld.targets, self.weld.spins, self.cos_sin, strict=True)
+        for station, target, spin, (cos, sin) in couplings:
             flange = Chain(station.robot).links(cos, sin, base_pose(station))[-1]
             is_ = flange @ constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
-            asked: Frame = tcp_pose(station.coupling, T_W_C, target)
+            asked: Frame = tcp_pose(station.coupling, T_W_C, target, spin)
             found.append((is_.p - asked.p, asked.R.T @ is_.R))
         return found
 

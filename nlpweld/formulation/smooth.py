@@ -123,10 +123,15 @@ def step_function(stage: Stage, mode: Mode, bound: float) -> ca.Function:
         pairs.append([grip(x, p, _branch(branch))[0] for p in both])
     if stage.table:
         pairs.append([stage.table(p)[0] for p in both])
-    gaps = [(ca.sum2(here * there) - np.cos(bound)) / (1 - np.cos(bound)) for here, there in pairs]
-    penalty = STEP_WEIGHT * softened(gaps, sharpness)
+    penalty = step_penalty([ca.sum2(here * there) for here, there in pairs], bound, sharpness)
     inputs = [ca.vertcat(z, u), ca.vertcat(data, following), sharpness]
     return ca.Function("step", inputs, [penalty], {"cse": True})
+
+
+def step_penalty(cosines: Iterable[ca.SX], bound: float, sharpness: ca.SX) -> ca.SX:
+    """Return the penalty on joints that turn by more than a bound [rad], from the cosines of what they turn by."""
+    gaps = [(cosine - np.cos(bound)) / (1 - np.cos(bound)) for cosine in cosines]
+    return STEP_WEIGHT * softened(gaps, sharpness)
 
 
 def _variables(stage: Stage) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
