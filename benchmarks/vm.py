@@ -51,7 +51,7 @@ class Vm:
         angles = [np.array(grip[0]).reshape(6, n, 2) for grip in grips]
         if not good or not all(_inside(s.robot, a, need) for s, a in zip(self.cell.stations, angles, strict=True)):
             return Verdict(float("-inf"), False)
-        limbs = [f(grip[0]) for f, grip in zip(self.limbs, grips, strict=True)]
+        limbs = [f(at, grip[0]) for f, grip in zip(self.limbs, grips, strict=True)]
         ends = [*(limb[1] for limb in limbs), self.work(at, self.points)]
         low = [float(ca.mmin(f(own))) for f, own in zip(self.heights, ends, strict=True)]
         low += [float(ca.mmin(f(ends[a], ends[b]))) for (a, b), f in self.meetings.items()]

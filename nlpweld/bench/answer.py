@@ -195,7 +195,8 @@ def _after(first: Answer, second: Answer, round_: int) -> Answer:
     a, b = first.outcome, second.outcome
     plan = second.plan
     if plan is not None and first.plan is not None:
-        plan = replace(plan, cell=first.plan.cell)
+        stated = first.plan.cell.model_copy(update={"stations": plan.cell.stations})  # each has its own layout
+        plan = replace(plan, cell=stated)
     outcome = replace(
         b,
         evaluations=a.evaluations + b.evaluations,

@@ -107,6 +107,7 @@ def run_task(task: Task) -> Record:
         verified=answer.verified,
         variables=len(nlp.names),
         placement=None if outcome.x is None else _placement(task.cell, outcome.x),
+        layout=_layout(task.cell, outcome.x),
         claimed_objective=_number(outcome.objective),
         evaluations=outcome.evaluations,
         build_s=outcome.build_s,
@@ -173,6 +174,11 @@ def _placement(cell: Cell, x: np.ndarray) -> dict[str, float]:
 def _branches(answer: Answer) -> dict[str, list[str]] | None:
     branches = answer.plan.branches if answer.plan else None
     return None if branches is None else {name: list(branch) for name, branch in branches.items()}
+
+
+def _layout(cell: Cell, x: np.ndarray | None) -> dict[str, dict[str, float]]:
+    """Return where bases stand that a search may move, by robot; nothing where all are held."""
+    return {} if x is None else cell.layout(x[: len(cell.variables)])
 
 
 def _number(value: float) -> float | None:

@@ -1,13 +1,14 @@
 """The cell: robots, tools, workpiece, seams, search box and constraint levels, all frozen."""
 
 import hashlib
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from nlpweld.cell.checked import Checked, Name, Vector
 from nlpweld.cell.complaint import nearest
+from nlpweld.cell.layout import BASE_AXES
 from nlpweld.cell.levels import WITHOUT_HANDLERS, Configuration, Constraints, Freedom, Objective, Search
 from nlpweld.cell.robot import Body
 from nlpweld.cell.seams import Composite, Polyline
@@ -106,6 +107,15 @@ class Cell(Checked):
         return self
 
     @model_validator(mode="after")
+    def _something_is_searched(self) -> "Cell":
+        if not self.variables:
+            raise ValueError(
+                "search: every coordinate is held; leave at least one free, its lower bound below its upper, "
+                "or a base by a [stations.layout]"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _tool_bodies_hang_on_frames_there_are(self) -> "Cell":
         for station in self.stations:
             n = len(station.robot.joints)
@@ -133,7 +143,8 @@ class Cell(Checked):
     @property
     def content_hash(self) -> str:
         """SHA-256 of everything the cell states, sources included, as hexadecimal digits."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
+        held: Any = {"stations": {k: {"layout"} for k, s in enumerate(self.stations) if s.layout is None}}
+        return hashlib.sha256(self.model_dump_json(exclude=held).encode()).hexdigest()
 
     @property
     def tight(self) -> list[bool]:
@@ -151,35 +162,74 @@ class Cell(Checked):
         return (*self.workpiece.bodies, *(self.positioner.robot.bodies if self.positioner else ()))
 
     @property
+    def bounds(self) -> np.ndarray:
+        """Bounds of placement (4) and of every base (3), held ones included, shape (2, 4 + 3 S) [m; rad]."""
+        return np.hstack([self.search.bounds, *(station.base_bounds for station in self.stations)])
+
+    @property
     def _free(self) -> np.ndarray:
-        lower, upper = self.search.bounds
+        lower, upper = self.bounds
         return lower < upper
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Names of the coordinates of the placement that are free, in the order x_m, y_m, z_m, yaw_rad."""
-        return tuple(name for name, free in zip(VARIABLES, self._free, strict=True) if free)
+        """Names of the coordinates that are free: of the placement, in the order x_m, y_m, z_m, yaw_rad, then of bases.
+
+        Those of a base are led by its robot's name, as in ``welder.x_m``.
+        """
+        names = [*VARIABLES, *(f"{station.name}.{axis}" for station in self.stations for axis in BASE_AXES)]
+        return tuple(name for name, free in zip(names, self._free, strict=True) if free)
+
+    @property
+    def drift(self) -> tuple[str, ...]:
+        """Axes along which placement and all bases may move together, which changes nothing but where the answer is.
+
+        A turn of everything also needs bases that may move along x and y, and no torch with a heading in W.
+        """
+        owners = ["", *(f"{station.name}." for station in self.stations)]
+        open_ = [axis for axis in BASE_AXES if all(f"{owner}{axis}" in self.variables for owner in owners)]
+        headed = any(getattr(station.coupling, "heading_deg", None) is not None for station in self.stations)
+        return tuple(axis for axis in open_ if axis != "yaw_rad" or (len(open_) == len(BASE_AXES) and not headed))
 
     @property
     def box(self) -> np.ndarray:
         """Bounds of the free coordinates, shape (2, d) [m; rad]."""
-        return self.search.bounds[:, self._free]
+        return self.bounds[:, self._free]
 
     def placement(self, x: np.ndarray) -> np.ndarray:
-        """Return x, y, z [m] and yaw [rad] of the placement frame for free coordinates x, shape (4,)."""
-        whole = self.search.bounds[0].copy()
+        """Return x, y, z [m] and yaw [rad] of the placement frame for free coordinates x (d,), shape (4,)."""
+        return self._whole(x)[: len(VARIABLES)]
+
+    def bases(self, x: np.ndarray) -> np.ndarray:
+        """Return x, y [m] and yaw [rad] of every station's base for free coordinates x (d,), shape (S, 3)."""
+        return self._whole(x)[len(VARIABLES) :].reshape(-1, len(BASE_AXES))
+
+    def layout(self, x: np.ndarray) -> dict[str, dict[str, float]]:
+        """Return by robot and axis [m; rad] where those bases stand that are not held, for free coordinates x (d,)."""
+        free = self._free[len(VARIABLES) :].reshape(-1, len(BASE_AXES)).tolist()
+        named = zip(self.stations, self.bases(x).tolist(), map(any, free), strict=True)
+        return {station.name: dict(zip(BASE_AXES, base, strict=True)) for station, base, moves in named if moves}
+
+    def laid_out(self, x: np.ndarray) -> "Cell":
+        """Return the cell with its bases where free coordinates x (d,) put them; their bounds stay."""
+        moved = [station.standing_at(base) for station, base in zip(self.stations, self.bases(x), strict=True)]
+        return self.model_copy(update={"stations": tuple(moved)})
+
+    def _whole(self, x: np.ndarray) -> np.ndarray:
+        """Return placement and bases for free coordinates x (d,), shape (4 + 3 S,) [m; rad]."""
+        whole = np.concatenate([self.search.bounds[0], *(station.base for station in self.stations)])
         whole[self._free] = x
         return whole
 
     def coordinates(self, placement: np.ndarray) -> np.ndarray:
-        """Return the free coordinates (d,) of a placement (3,) [m] or (4,) [m; rad].
+        """Return the free coordinates (d,) of a placement (3,) [m] or (4,) [m; rad], with bases as they are stated.
 
         Raises:
             OptionError: a coordinate that the cell holds has another value.
         """
-        given = self.search.bounds[0].copy()
+        given = np.concatenate([self.search.bounds[0], *(station.base for station in self.stations)])
         given[: len(placement)] = placement
-        for name, free, value, held in zip(VARIABLES, self._free, given, self.search.bounds[0], strict=True):
+        for name, free, value, held in zip(VARIABLES, self._free, given, self.search.bounds[0], strict=False):
             if not free and abs(value - held) > 1e-12:
                 raise OptionError(f"{self.name}: {name} is held at {held:g} and cannot be {value:g}; open [search]")
         return given[self._free]

@@ -31,8 +31,6 @@ class Search(Sourced):
                 raise ValueError(f"lower_m.{axis} {low:g} is not below upper_m.{axis} {high:g}; swap them")
         if self.yaw_deg[0] > self.yaw_deg[1]:
             raise ValueError(f"yaw_deg {self.yaw_deg[0]:g} is above {self.yaw_deg[1]:g}; swap them")
-        if not (self.bounds[0] < self.bounds[1]).any():
-            raise ValueError("every coordinate is held; leave at least one free, its lower bound below its upper")
         return self
 
     @property

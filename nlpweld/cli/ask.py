@@ -2,6 +2,7 @@
 
 import json as json_
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -127,6 +128,7 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
 
     if out is not None:
         writable(out)
+    _tell_drift(asked.cell)
     name, _, preset = asked.solver.partition(":")
     nlp = formulate(asked.cell, asked.formulation)
     with _busy(f"{asked.solver} on {asked.cell.name}, seed {asked.seed}", quiet=json) as tell:
@@ -138,6 +140,8 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
         budget = Budget(asked.evaluations, asked.time_limit_s)
         watched = replace(nlp, evaluate=counted)
         answer = solve_(watched, name, seed=asked.seed, budget=budget, preset=preset or "default")
+    x = None if answer.outcome.x is None else answer.outcome.x[: len(asked.cell.variables)]  # it may go on with joints
+    layout = {} if x is None else asked.cell.layout(x)
     keep = answer.plan if answer.outcome.status != "INFEASIBLE" else None  # a near miss is reported, not planned
     plan_path = keep.save(out / "plan.json") if keep is not None and out is not None else None
     outcome, report = answer.outcome, answer.report
@@ -147,7 +151,8 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
         "seed": asked.seed,
         "status": outcome.status,
         "message": outcome.message,
-        "placement": None if outcome.x is None else _placement(asked.cell, outcome.x),
+        "placement": None if x is None else _placement(asked.cell, x),
+        "layout": layout,
         "evaluations": outcome.evaluations,
         "build_s": round(outcome.build_s, 4),
         "solve_s": round(outcome.solve_s, 4),
@@ -160,6 +165,9 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
         print(f"{asked.solver}, seed {asked.seed}: {outcome.status} ({outcome.message})")
         print(f"  {outcome.evaluations} evaluations, build {outcome.build_s:.2f} s, solve {outcome.solve_s:.2f} s")
         print(report or "no answer to verify")
+        for robot, base in layout.items():
+            x_m, y_m, yaw_rad = base.values()
+            print(f"  {robot} stands at ({x_m:.4f}, {y_m:.4f}) m, turned by {np.degrees(yaw_rad) + 0.0:.2f} deg")
         if keep is None:
             print("no plan: nothing feasible was found; above is the nearest miss")
         else:
@@ -204,9 +212,16 @@ def _where(cell: Cell, at: tuple[float, float, float] | None, placement: str | N
 
 
 def _placement(cell: Cell, x: np.ndarray) -> list[float]:
-    """Return x, y, z [m], and yaw [rad] where it is free; x may go on with joints."""
-    whole = cell.placement(x[: len(cell.variables)]).tolist()
+    """Return x, y, z [m], and yaw [rad] where it is free."""
+    whole = cell.placement(x).tolist()
     return whole if "yaw_rad" in cell.variables else whole[:3]
+
+
+def _tell_drift(cell: Cell) -> None:
+    """Say on standard error along which axes an answer is one of many."""
+    if cell.drift:
+        axes = ", ".join(cell.drift)
+        print(f"note: bases and placement may move together along {axes}; hold one base there", file=sys.stderr)
 
 
 def _start(plan: Plan | None) -> dict[str, Any]:

@@ -201,9 +201,9 @@ def placed_work(facts, scratch, x):
     middles(scratch.ends[stations, 0], scratch.middles[stations, 0], facts.counts[stations])
 
 
-def placed_limbs(facts, scratch, k, b):
-    """Go on from joints to velocity ellipsoid and bodies."""
-    limbs(k, scratch.cos_sin, scratch.gram[k, b], scratch.ends[k, b])
+def placed_limbs(facts, scratch, x, k, b):
+    """Go on from joints and base to velocity ellipsoid and bodies."""
+    limbs(k, x, scratch.cos_sin, scratch.gram[k, b], scratch.ends[k, b])
     middles(scratch.ends[k, b], scratch.middles[k, b], facts.counts[k])
 
 
@@ -219,7 +219,7 @@ def sides(facts, scratch, x):
                 if not have_work:
                     placed_work(facts, scratch, x)
                     have_work = True
-                placed_limbs(facts, scratch, k, b)
+                placed_limbs(facts, scratch, x, k, b)
                 scratch.missed[k, b, 3] = missed_alone(facts, scratch, k, b)
         complete = complete and any_seen
     return missed_gap(facts, lowest_height(facts, scratch.ends[stations, 0], stations)) if complete else 0.0

@@ -3,12 +3,14 @@
 Pan et al., eq. 1 to 8; Zhang et al., eq. 5 to 15.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from nlpweld.cell.cell import VARIABLES, Cell
+from nlpweld.cell.layout import BASE_AXES
 from nlpweld.cell.station import Station
 from nlpweld.cell.task import Grasp, Torch, TorchAngles
 from nlpweld.formulation.freedom import TILTS, turn, turned_work
@@ -167,13 +169,31 @@ def moving_bodies(cell: Cell) -> list[int]:
 def placement_frame(cell: Cell, x: ca.SX) -> Frame:
     """Return T_W_P of free coordinates x (d, 1); those that are held are numbers."""
     whole = ca.SX(ca.DM(cell.search.bounds[0]))
-    free = [i for i, name in enumerate(VARIABLES) if name in cell.variables]
-    whole[free] = x
+    free = _fill(whole, cell, VARIABLES, x)
     if 3 not in free and cell.search.bounds[0, 3] == 0.0:
         return Frame(constant(np.eye(4)).R, whole[:3])
     c, s = ca.cos(whole[3]), ca.sin(whole[3])
     rows = [ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1)]
     return Frame(ca.sparsify(ca.vertcat(*rows)), whole[:3])
+
+
+def base_frame(cell: Cell, k: int, x: ca.SX) -> Frame:
+    """Return T_W_B of station k for free coordinates x (d, 1); what its layout holds is a number."""
+    station, whole = cell.stations[k], ca.SX(ca.DM(cell.stations[k].base))
+    free = _fill(whole, cell, [f"{station.name}.{axis}" for axis in BASE_AXES], x)
+    p = ca.vertcat(whole[:2], station.base_position_m[2])
+    if 2 not in free:
+        return Frame(base_pose(station).R, p)
+    level = constant(rpy_pose(station.base_position_m, (*station.base_rpy_deg[:2], 0.0)))
+    return Frame(turn("z", whole[2]) @ level.R, p)
+
+
+def _fill(whole: ca.SX, cell: Cell, names: Sequence[str], x: ca.SX) -> list[int]:
+    """Write those of named coordinates that are free into a vector of all, and return which they are."""
+    free = [i for i, name in enumerate(names) if name in cell.variables]
+    for i in free:
+        whole[i] = x[cell.variables.index(names[i])]
+    return free
 
 
 def tcp_pose(coupling: Grasp | Torch, T_W_C: Frame, target: Frame | None, spin: ca.SX | None = None) -> Frame:
@@ -203,16 +223,18 @@ def torch_rotation(heading_deg: float) -> ca.SX:
     return constant(pose).R
 
 
-def flange_pose(station: Station, T_W_C: Frame, target: Frame | None, spin: ca.SX | None = None) -> Frame:
+def flange_pose(
+    station: Station, T_W_C: Frame, target: Frame | None, spin: ca.SX | None = None, base: Frame | None = None
+) -> Frame:
     """Return T_B_F, the flange pose in the station's base frame that its coupling asks for.
 
-    The loop is closed here (Pan et al., eq. 7, 8; Zhang et al., eq. 15).
+    The loop is closed here (Pan et al., eq. 7, 8; Zhang et al., eq. 15). The base T_W_B is as stated by default.
     """
     T_W_E = tcp_pose(station.coupling, T_W_C, target, spin)
     T_F_E = constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
-    return base_pose(station).inverse() @ T_W_E @ T_F_E.inverse()
+    return (base or base_pose(station)).inverse() @ T_W_E @ T_F_E.inverse()
 
 
 def base_pose(station: Station) -> Frame:
-    """Return T_W_B of a station."""
+    """Return T_W_B of a station whose base stands where it is stated."""
     return constant(rpy_pose(station.base_position_m, station.base_rpy_deg))

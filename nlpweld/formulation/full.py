@@ -256,7 +256,8 @@ class Full:
     def unpack(self, z: np.ndarray, mode: int) -> Plan:
         """Return the plan of variables z (n,); its branches are those z is on, whatever the mode."""
         cell, z = self.cell, np.asarray(z, dtype=float)
-        s, placement = seam_parameters(cell), cell.placement(z[: self.arrow.shared])
+        x = z[: self.arrow.shared]
+        s, placement = seam_parameters(cell), cell.placement(x)
         q = self._settled(self.joints(z[None]))[0, ..., : self.arrow.points]
         paths = {station.name: q[k].T for k, station in enumerate(cell.stations)}
         turned = held(cell, s).q
@@ -264,7 +265,7 @@ class Full:
             paths[cell.positioner.name] = turned
         found = self._branches(self._judged(z[None])[2])[0]
         branches = {st.name: (b[0], b[1], b[2]) for st, b in zip(cell.stations, found, strict=True)}
-        return Plan(cell, placement[:3], s, paths, branches, float(placement[3]))
+        return Plan(cell.laid_out(x), placement[:3], s, paths, branches, float(placement[3]))
 
     def starts(self, seed: int, count: int) -> np.ndarray:
         """Return the best of some random placements, with joints by inverse kinematics on their best modes, (count, n).

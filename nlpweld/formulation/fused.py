@@ -147,7 +147,7 @@ def source(stage: Stage, n: int) -> str:
     """Return the source text of the module that judges a cell's candidates at n seam points."""
     kernels: dict[str, tuple[ca.Function, Kinds]]
     kernels = {f"grip_{k}": (f, ("candidate", "point", "number")) for k, f in enumerate(stage.grips)}
-    kernels |= {f"limbs_{k}": (f, ("lane",)) for k, f in enumerate(stage.limbs)}
+    kernels |= {f"limbs_{k}": (f, ("candidate", "lane")) for k, f in enumerate(stage.limbs)}
     kernels["work"] = stage.work, ("candidate", "point")
     kernels["gap"] = stage.gap, ("lane", "lane", "number")
     kernels["value"] = value_graph(stage.cell), ("lane", "lane")
@@ -155,7 +155,7 @@ def source(stage: Stage, n: int) -> str:
     parts += [INNER + kernel_source(f, kinds, n, name) for name, (f, kinds) in kernels.items()]
     stations = range(len(stage.grips))
     parts.append(_switch("grip", "x, points, signs, cos_sin, w, reach", stations))
-    parts.append(_switch("limbs", "cos_sin, gram, ends", stations))
+    parts.append(_switch("limbs", "x, cos_sin, gram, ends", stations))
     parts += [(JIT if f is candidate.judge else INNER) + inspect.getsource(f) for f in STEPS]
     return "\n\n".join(parts)
 

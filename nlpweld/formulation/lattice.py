@@ -128,7 +128,7 @@ class Lattice:
 
     @cached_property
     def _limbs(self) -> list[Kernel]:
-        return [numpy_kernel(limbs, ("lane",)) for limbs in self.form.stage.limbs]
+        return [numpy_kernel(limbs, ("candidate", "lane")) for limbs in self.form.stage.limbs]
 
     @cached_property
     def _work(self) -> Kernel:
@@ -174,7 +174,7 @@ class Lattice:
         slot[kept] = np.arange(len(kept))
         ends = np.empty((6 * len(self.form.stage.shapes[k]), len(kept)))
         for c in _slices(len(kept)):
-            (gram[kept[c]],), ends[:, c] = self._limbs[k](cos_sin[:, kept[c]])
+            gram[kept[c]], ends[:, c] = map(_columns, self._limbs[k](x[None], cos_sin[:, None, kept[c]]))
         ok[kept] = self._above_floor(k, ends)
         owner = _shaped(Owner(ok, slot, ends), (-1, *own))
         owner = Owner(self.apart(k, owner, len(self.form.cell.stations), work), owner.slot, ends)

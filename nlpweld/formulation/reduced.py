@@ -1,4 +1,4 @@
-"""The reduced form: the placement's coordinates are the variables, joints eliminated by inverse kinematics."""
+"""The reduced form: coordinates of placement and bases are the variables, joints eliminated by inverse kinematics."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -36,10 +36,10 @@ class OutOfReach:
 
 
 def reduced(cell: Cell, engine: str = "auto") -> Nlp:
-    """Return the reduced form of a cell: variables are the free coordinates of its placement [m; rad].
+    """Return the reduced form of a cell: variables are the free coordinates of its placement and layout [m; rad].
 
     Those are the origin of C in W for Pan et al. (the three genes), and where the positioner stands, (HD, FB), for
-    Zhang et al.
+    Zhang et al.; then what the cell's layout frees of its robots' bases.
 
     Args:
         cell: the cell.
@@ -117,7 +117,7 @@ class Unpacker:
             shoulder, elbow = self.batch.modes[mode][k]
             cos_sin, reach = self._solve(k, x, (shoulder, elbow))
             if reach.min() < 0.0:
-                return OutOfReach(cell, station.name, int(reach.argmin()))
+                return OutOfReach(cell.laid_out(x), station.name, int(reach.argmin()))
             lanes = cos_sin[:, None, :]
             wrists = allowed(cell.configuration.wrist, WRIST)
             need = np.radians(cell.constraints.joint_margin_deg)
@@ -128,7 +128,7 @@ class Unpacker:
         s, placement = seam_parameters(cell), cell.placement(x)
         if cell.positioner:
             paths[cell.positioner.name] = self._turned(cell.positioner, held(cell, s).q)
-        return Plan(cell, placement[:3], s, paths, branches, float(placement[3]))
+        return Plan(cell.laid_out(x), placement[:3], s, paths, branches, float(placement[3]))
 
     def _turned(self, positioner: Positioner, q: np.ndarray | None) -> np.ndarray:
         """Return the positioner's joints at the seam points, shape (N, n) [rad]."""

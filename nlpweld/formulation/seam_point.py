@@ -5,7 +5,7 @@ from functools import cached_property
 
 import casadi as ca
 
-from nlpweld.formulation.coupling import WeldPoint, base_pose, placement_frame, tcp_pose, weld_point
+from nlpweld.formulation.coupling import WeldPoint, base_frame, placement_frame, tcp_pose, weld_point
 from nlpweld.formulation.smooth import Gaps, chosen_gaps, softened
 from nlpweld.formulation.stage import GAP_SCALE_M, Stage
 from nlpweld.kinematics.chain import Chain, Frame, constant, rpy_pose
@@ -69,8 +69,8 @@ class SeamPoint:
         cell, found = self.stage.cell, []
         T_W_C = placement_frame(cell, self._x) @ self.weld.T_P_C
         couplings = zip(cell.stations, self.weld.targets, self.weld.spins, self.cos_sin, strict=True)
-        for station, target, spin, (cos, sin) in couplings:
-            flange = Chain(station.robot).links(cos, sin, base_pose(station))[-1]
+        for k, (station, target, spin, (cos, sin)) in enumerate(couplings):
+            flange = Chain(station.robot).links(cos, sin, base_frame(cell, k, self._x))[-1]
             is_ = flange @ constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
             asked: Frame = tcp_pose(station.coupling, T_W_C, target, spin)
             found.append((is_.p - asked.p, asked.R.T @ is_.R))
@@ -96,7 +96,7 @@ class SeamPoint:
 
     @cached_property
     def _limbs(self) -> list[tuple[ca.SX, ca.SX]]:
-        return [limbs(ca.horzcat(*cs)) for limbs, cs in zip(self.stage.limbs, self.cos_sin, strict=True)]
+        return [limbs(self._x, ca.horzcat(*cs)) for limbs, cs in zip(self.stage.limbs, self.cos_sin, strict=True)]
 
     @property
     def mmr(self) -> ca.SX:

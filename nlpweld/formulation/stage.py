@@ -1,11 +1,11 @@
 """The stage: one seam point of the cell as a CasADi graph. Every solver, population or gradient, sees this physics.
 
 It comes in parts. For each station a *grip* graph goes from placement and seam point, on a given inverse kinematics
-branch, to joints, manipulability and reach; a *limbs* graph goes on from the joints to the velocity ellipsoid and the
-ends of the bodies; the *arm* graph is both. The *work* graph gives the ends of the workpiece's bodies. For every two
-owners of bodies, robots or workpiece, a *meeting* graph goes from two sets of body ends to their distances, and for
-each a *height* graph to its distances from the floor. Parts let a population solver stop early: most candidates fail
-in the grip, and most bodies are far apart.
+branch, to joints, manipulability and reach; a *limbs* graph goes on from the joints, and from where the base stands,
+to the velocity ellipsoid and the ends of the bodies; the *arm* graph is both. The *work* graph gives the ends of the
+workpiece's bodies. For every two owners of bodies, robots or workpiece, a *meeting* graph goes from two sets of body
+ends to their distances, and for each a *height* graph to its distances from the floor. Parts let a population solver
+stop early: most candidates fail in the grip, and most bodies are far apart.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from nlpweld.cell.cell import Cell
 from nlpweld.cell.robot import Body
 from nlpweld.cell.station import Station
 from nlpweld.errors import KinematicsError
-from nlpweld.formulation.coupling import base_pose, flange_pose, moving_bodies, placement_frame, weld_point
+from nlpweld.formulation.coupling import base_frame, flange_pose, moving_bodies, placement_frame, weld_point
 from nlpweld.formulation.holder import held
 from nlpweld.geometry.capsules import segment_distance
 from nlpweld.geometry.seam import seam_parameters
@@ -43,7 +43,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Stage:
-    """The graphs of one cell. Placement x holds the free coordinates of the placement frame {P} in W [m; rad].
+    """The graphs of one cell. Placement x holds the free coordinates of the placement frame {P}, and of bases, in W.
 
     Owners of bodies are numbered: the stations in their order, then the work, which is the workpiece and the
     positioner that holds it. Ends of an owner's bodies are (3, 2b) [m] in W: start and end of one body beside the
@@ -60,12 +60,12 @@ class Stage:
     @cached_property
     def grips(self) -> tuple[ca.Function, ...]:
         """One function per station: ``(x, point, branch) -> cos_sin (6, 2), w, reach``."""
-        return tuple(self._grip(station) for station in self.cell.stations)
+        return tuple(self._grip(k) for k in range(len(self.cell.stations)))
 
     @cached_property
     def limbs(self) -> tuple[ca.Function, ...]:
-        """One function per station: ``(cos_sin) -> gram, ends``."""
-        return tuple(self._limbs(station) for station in self.cell.stations)
+        """One function per station: ``(x, cos_sin) -> gram, ends``."""
+        return tuple(self._limbs(k) for k in range(len(self.cell.stations)))
 
     @cached_property
     def arms(self) -> tuple[ca.Function, ...]:
@@ -169,27 +169,29 @@ class Stage:
         gap = segment_distance(*axes, *ca.vertsplit(numbers[:2])) - numbers[2]
         return _function("gap", [a, b, numbers], [gap], ["ends_a", "ends_b", "numbers"], ["gap"])
 
-    def _grip(self, station: Station) -> ca.Function:
-        x, point, branch = self._x, weld_point(self.cell, self.free), ca.SX.sym("branch", 3)
-        T_W_C = placement_frame(self.cell, x) @ point.T_P_C
-        k = self.cell.stations.index(station)
-        found = self._inverse(station).solve(flange_pose(station, T_W_C, point.targets[k], point.spins[k]), branch)
+    def _grip(self, k: int) -> ca.Function:
+        station, x = self.cell.stations[k], self._x
+        point, branch = weld_point(self.cell, self.free), ca.SX.sym("branch", 3)
+        T_W_C, T_W_B = placement_frame(self.cell, x) @ point.T_P_C, base_frame(self.cell, k, x)
+        T_B_F = flange_pose(station, T_W_C, point.targets[k], point.spins[k], T_W_B)
+        found = self._inverse(station).solve(T_B_F, branch)
         outputs = [ca.horzcat(found.cos, found.sin), self._inverse(station).abs_det_jacobian(found), found.reach]
         inputs = [x, point.vector, branch]
         return _function(f"grip_{station.name}", inputs, outputs, ["x", "point", "branch"], ["cos_sin", "w", "reach"])
 
-    def _limbs(self, station: Station) -> ca.Function:
-        cos_sin = ca.SX.sym("cos_sin", len(station.robot.joints), 2)
-        links = Chain(station.robot).links(cos_sin[:, 0], cos_sin[:, 1], base_pose(station))
+    def _limbs(self, k: int) -> ca.Function:
+        station, x = self.cell.stations[k], self._x
+        cos_sin, base = ca.SX.sym("cos_sin", len(station.robot.joints), 2), base_frame(self.cell, k, x)
+        links = Chain(station.robot).links(cos_sin[:, 0], cos_sin[:, 1])  # in {B}: the ellipsoid is the same anywhere
         tcp = links[-1] @ constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
-        ends = ca.horzcat(*[end for body in station.bodies for end in body_ends(body, links, tcp)])
+        ends = ca.horzcat(*[base.point(end) for body in station.bodies for end in body_ends(body, links, tcp)])
         outputs = [det_gram(jacobian_of(links, tcp.p)[0]), ends]
-        return _function(f"limbs_{station.name}", [cos_sin], outputs, ["cos_sin"], ["gram", "ends"])
+        return _function(f"limbs_{station.name}", [x, cos_sin], outputs, ["x", "cos_sin"], ["gram", "ends"])
 
     def _arm(self, k: int) -> ca.Function:
         x, point, branch = self._x, weld_point(self.cell, self.free).vector, ca.SX.sym("branch", 3)
         cos_sin, w, reach = self.grips[k](x, point, branch)
-        gram, ends = self.limbs[k](cos_sin)
+        gram, ends = self.limbs[k](x, cos_sin)
         name, names = f"arm_{self.cell.stations[k].name}", ["cos_sin", "w", "gram", "reach", "ends"]
         return _function(name, [x, point, branch], [cos_sin, w, gram, reach, ends], ["x", "point", "branch"], names)
 

@@ -71,7 +71,7 @@ class Staged:
 
     @cached_property
     def _limbs(self) -> list[Kernel]:
-        return [numpy_kernel(limbs, ("lane",)) for limbs in self.stage.limbs]
+        return [numpy_kernel(limbs, ("candidate", "lane")) for limbs in self.stage.limbs]
 
     @cached_property
     def _work(self) -> Kernel:
@@ -140,7 +140,7 @@ class Staged:
         if not len(near):
             nothing = np.empty((0, self.points.shape[1]))
             return Side(missed, slot, nothing, nothing, [], np.empty((2, 0, 3, 0)))
-        parts = [self._limbs[k](rows(cos_sin, c)) for c in _slices(len(near), self._chunk)]
+        parts = [self._limbs[k](X[near[c]], rows(cos_sin, c)) for c in _slices(len(near), self._chunk)]
         gram, ends = joined([part[0] for part in parts])[0], joined([part[1] for part in parts])
         side = Side(missed, slot, w, gram, ends, boxes(ends, self.stage.shapes[k]))
         missed[near, 3] = self._missed_gap(self._lowest_alone(k, X[near], side))

@@ -78,6 +78,7 @@ def row(record: Record) -> dict[str, Any]:
     numbers["limit_s"] = _number(record.budget.time_s)
     placement = record.placement or {}
     place = {name: _number(placement.get(name)) for name in AXES} | {k: _number(v) for k, v in placement.items()}
+    place |= {f"{robot}.{axis}": value for robot, at in record.layout.items() for axis, value in at.items()}
     head = {name: getattr(record, name) for name in PLAIN}
     told = {"claimed": record.status == "SOLVED", "verified": verified(record)}
     return head | told | numbers | place | report_row(record.report)

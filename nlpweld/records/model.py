@@ -85,6 +85,7 @@ class Record(Part):
         stderr: last lines on standard error of a run that failed.
         verified: the verifier's word.
         placement: x_m, y_m, z_m, yaw_rad of the answer, and what else is free, by name.
+        layout: x_m, y_m, yaw_rad of the bases that were free, by robot.
         claimed_objective: the solver's objective.
         wall_s: time of the process from its start to its end, verification included.
         answers: what the run held on its way, oldest first.
@@ -114,6 +115,7 @@ class Record(Part):
     verified: bool
     variables: Count = 0
     placement: dict[str, float] | None = None
+    layout: dict[str, dict[str, float]] = {}
     claimed_objective: float | None = None
     evaluations: Count = 0
     build_s: Seconds | None = None

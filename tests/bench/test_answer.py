@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import nlpweld as nw
-from nlpweld.bench.answer import with_branches
+from nlpweld.bench.answer import _after, with_branches
 from nlpweld.cell import READINGS
+from nlpweld.solvers import Outcome
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +73,17 @@ def test_what_soft_penalties_cost_is_told_and_fades_as_they_sharpen(cell) -> Non
     assert (gaps > 0).all()
     assert gaps[-1] < 1e-4 < gaps[0]
     assert steps[-1]["missed"] == 0.0
+
+
+def test_answer_after_margins_grew_keeps_its_own_bases_in_the_cell_as_stated(cell) -> None:
+    data = cell.model_dump(mode="python", exclude_unset=True)
+    data["stations"][2]["layout"] = {"x_m": (-0.1, 0.1), "source": "test"}
+    stated = nw.Cell.model_validate(data)
+    grown = stated.with_(constraints={"clearance_margin_m": 0.004})
+    answers = []
+    for own, x in ((stated, 0.02), (grown, 0.05)):
+        plan = nw.reduced(own, engine="numpy").unpack(np.array([0.0, -0.17, 0.4, x]), 0)
+        answers.append(nw.Answer(Outcome("SOLVED", None, 0, 0.0, 0, 0.0, 0.0), plan, None))
+    last = _after(*answers, 1).plan
+    assert last.cell.stations[2].base_position_m == (0.05, 1.0, 0.0)
+    assert last.cell.constraints == stated.constraints

@@ -6,7 +6,10 @@ from itertools import pairwise
 
 import pytest
 
+from nlpweld.bench.compare import table
 from nlpweld.bench.task import Task, run_task
+from nlpweld.cell import Cell
+from nlpweld.engine import choice
 from nlpweld.solvers import Budget
 
 
@@ -85,3 +88,16 @@ def test_a_time_limit_is_a_timeout_record_with_the_best_so_far(task):
     record = run_task(replace(task, solver="ga", budget=Budget(time_s=0.3)))
     assert record.status == "TIMEOUT"
     assert record.placement is not None
+
+
+def test_record_tells_where_free_bases_stand_and_held_ones_not(cell, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(choice, "find_spec", lambda name: None)  # NumPy is ready sooner than a new cell is compiled
+    data = cell.model_dump(mode="python", exclude_unset=True)
+    data["stations"][2]["layout"] = {"x_m": (-0.1, 0.1), "source": "test"}
+    budget = Budget(evaluations=200)
+    free, held = (run_task(Task(c, "random_search", 0, budget=budget)) for c in (Cell.model_validate(data), cell))
+    assert list(free.layout) == ["welder"]
+    assert -0.1 <= free.layout["welder"]["x_m"] <= 0.1
+    assert free.layout["welder"]["y_m"] == 1.0
+    assert table([free])["welder.x_m"].tolist() == [free.layout["welder"]["x_m"]]
+    assert held.layout == {}

@@ -47,10 +47,10 @@ def test_engine_agrees_with_the_casadi_machine_on_ten_thousand_poses(cell: Cell,
         got = kernel(stage.grips[2], ("candidate", "point", "number"))(X, points, signs)
         want = grips[2]
     elif part == "limbs":
-        got = kernel(stage.limbs[0], ("lane",))(lanes[0])
-        want = stage.limbs[0].map(m * n)(grips[0][0])
+        got = kernel(stage.limbs[0], ("candidate", "lane"))(X, lanes[0])
+        want = stage.limbs[0].map(m * n)(wide, grips[0][0])
     else:
-        ends = [stage.limbs[k].map(m * n)(grips[k][0])[1] for k in (0, 2)]
+        ends = [stage.limbs[k].map(m * n)(wide, grips[k][0])[1] for k in (0, 2)]
         shapes = [stage.limbs[k].size_out("ends") for k in (0, 2)]
         given = [_lanes(np.array(e), *shape, (m, n)) for e, shape in zip(ends, shapes, strict=True)]
         got = kernel(stage.meetings[0, 2], ("lane", "lane"))(*given)

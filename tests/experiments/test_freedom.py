@@ -1,21 +1,25 @@
 """The freedom study: gains over the reduced form, and a row for every cell and formulation."""
 
 import sys
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from rich.console import Console
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "experiments"))
 
-from freedom import freedom_table, markdown, study, tasks
+from freedom import freedom_table, markdown, study
+
+from nlpweld.records.model import Record
+from tests.records import made
 
 
-def record(formulation: str, mean: float, verified: bool = True, cell: str = "a", seconds: float = 1.0) -> dict:
+def record(formulation: str, mean: float, verified: bool = True) -> Record:
     report = {"mmr_mean": mean, "mmr_min": mean / 2, "joint_step_rad": np.radians(19.0)}
-    head = {"cell": cell, "formulation": formulation, "verified": verified, "solve_s": seconds, "build_s": 0.5}
-    return {**head, "report": report}
+    return made.record(cell="a", formulation=formulation, verified=verified, report=report)
 
 
 def test_gain_is_over_the_best_verified_reduced_answer() -> None:
@@ -37,18 +41,13 @@ def test_markdown_has_a_line_for_every_row_and_leaves_unknown_numbers_out() -> N
     assert "| 0.25000 |" in lines[2]
 
 
-def test_yaw_is_not_asked_of_cells_with_a_positioner() -> None:
-    asked = {(t.cell.name, t.formulation) for t in tasks(1)}
-    assert ("three_er16", "redundant_spin_yaw") in asked
-    assert ("dual_welder_positioner", "redundant_spin_yaw") not in asked
-
-
 def test_small_study_runs_is_verified_and_resumes(tmp_path: Path) -> None:
-    which = {"cells": ("robot_positioner",), "formulations": ("reduced", "redundant_spin")}
-    table = study(tmp_path, 1, 1, Console(quiet=True), **which)
+    asked = Namespace(quick=True, out=tmp_path, workers=1)
+    study(asked, Console(quiet=True))
+    table = pd.read_csv(tmp_path / "tables" / "freedom.csv")
     assert table.verified.tolist() == [1, 1]
     assert table.gain_percent.tolist()[1] > 2.0
     before = [path.stat().st_mtime_ns for path in sorted(tmp_path.rglob("*.json"))]
-    study(tmp_path, 1, 1, Console(quiet=True), **which)
+    study(asked, Console(quiet=True))
     assert [path.stat().st_mtime_ns for path in sorted(tmp_path.rglob("*.json"))] == before
     assert (tmp_path / "tables" / "freedom.md").read_text().count("\n") == 4

@@ -205,7 +205,11 @@ def test_warm_start_is_the_only_one_and_stays_with_wider_margins() -> None:
 
 def test_ipopt_betters_its_starts_cold_and_from_a_plan_and_is_verified_along_the_seam() -> None:
     form = formed("robot_positioner", "spin", 36, 30.0)
-    nlp, ipopt, plan = form.nlp("full_spin", lambda extra: nlp, lambda: nlp), make_solver("ipopt", "full"), planned(form)
+    nlp, ipopt, plan = (
+        form.nlp("full_spin", lambda extra: nlp, lambda: nlp),
+        make_solver("ipopt", "full"),
+        planned(form),
+    )
     cold = ipopt.solve(nlp, seed=0, budget=Budget())
     warm = ipopt.solve(nlp.started(full_start(plan, "spin")), seed=0, budget=Budget())
     assert (warm.status, cold.status) == ("SOLVED", "SOLVED")
