@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = (
-    "cell", "formulation", "solver", "preset", "seed", "status", "verified", "mmr_mean", "claimed_objective",
-    "evaluations", "build_s", "solve_s",
+    "cell", "formulation", "solver", "preset", "seed", "status", "verified", "objective", "mmr_mean",
+    "claimed_objective", "evaluations", "build_s", "solve_s",
 )  # fmt: skip
 PLACED = ("x_m", "y_m", "z_m", "yaw_rad")
 
@@ -60,9 +60,10 @@ def compare(
 
 
 def table(records: Iterable[Record]) -> "pd.DataFrame":
-    """Return one row a run; MMR is the verifier's, and only of verified answers."""
+    """Return one row a run; objective and mean MMR are the verifier's, of verified answers."""
     from nlpweld.records.frames import runs_frame
 
     found = runs_frame(records)
-    found["mmr_mean"] = found["mmr_mean"].where(found["verified"])
+    for name in ("objective", "mmr_mean"):
+        found[name] = found[name].where(found["verified"])
     return found[[*COLUMNS, *(name for name in found.columns if name.endswith(PLACED)), "message"]]

@@ -19,11 +19,11 @@ def held_answers(nlp: Nlp, answer: Answer) -> list[Held]:
     outcome, found = answer.outcome, []
     for step in chosen(outcome):
         report = evaluate_plan(nlp, step.x, step.mode)[1]
-        objective = report.mmr_mean if report.samples else None
+        objective = report.objective if report.samples else None
         found.append(_held(step.time_s, step.evaluations, step.objective, objective, report.feasible))
     if answer.report is not None and np.isfinite(outcome.objective):
         end = outcome.build_s + outcome.solve_s
-        objective = answer.report.mmr_mean if answer.plan else None
+        objective = answer.report.objective if answer.plan else None
         found.append(_held(end, outcome.evaluations, outcome.objective, objective, answer.verified))
     return found
 

@@ -2,7 +2,7 @@
 
 from nlpweld.cell.cell import VARIABLES, Cell, Seam
 from nlpweld.cell.files import library_names
-from nlpweld.cell.levels import READINGS, Reading
+from nlpweld.cell.levels import OVER_SEAM, READINGS, Reading
 from nlpweld.cell.load import load_cell, load_positioner, load_robot
 from nlpweld.cell.robot import Body, End, Joint, Robot
 from nlpweld.cell.seams import Composite, Polyline
@@ -10,6 +10,7 @@ from nlpweld.cell.station import Station
 from nlpweld.cell.task import Capsule, Grasp, Positioner, Saddle, Tool, Torch, TorchAngles
 
 __all__ = [
+    "OVER_SEAM",
     "READINGS",
     "VARIABLES",
     "Body",

@@ -1,14 +1,16 @@
 """What is searched, allowed and asked for: placement box, branches, levels, objective."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from nlpweld.cell.checked import Finite, NonNegative, Positive, Sourced, Vector
 
 READINGS = ("paper", "equal", "harmonic", "sqrt_tight", "millimetres", "product", "mean")
 Reading = Literal["paper", "equal", "harmonic", "sqrt_tight", "millimetres", "product", "mean"]
+OVER_SEAM = ("mean", "minimum", "soft_minimum")
+OverSeam = Literal["mean", "minimum", "soft_minimum"]
 WITHOUT_HANDLERS = ("product", "mean")  # readings that do not tell tight from loose robots
 
 
@@ -73,9 +75,34 @@ class Constraints(Sourced):
 
 
 class Objective(Sourced):
-    """How the robots' manipulabilities make one number: a reading of Pan et al., eq. (16), their product or mean."""
+    """What is maximised: how the robots' manipulabilities make one number at a seam point, and those one of the seam.
+
+    ``reading`` is one of Pan et al., eq. (16), or the product or mean of all. ``over_seam`` is the ``mean`` over the
+    seam's N points, the ``minimum`` of them, or between the two the ``soft_minimum``, the power mean
+    ``(1/N sum_j m_j^-p)^(-1/p)`` with ``exponent`` p: a point half as good as another weighs 2^p times as much in the
+    sum. As the joint speed that a welding speed takes goes as 1/m, p = 1 (the harmonic mean) maximises what is got for
+    the mean joint speed and p = 2 for its root mean square; the minimum is the limit of large p, and is exceeded by no
+    more than the factor N^(1/p). All three grow with m in proportion, so none adds to what depends on the unit.
+    """
 
     reading: Reading
+    over_seam: OverSeam = "mean"
+    exponent: Positive | None = None
+
+    @model_validator(mode="after")
+    def _exponent_goes_with_the_soft_minimum(self) -> "Objective":
+        soft = self.over_seam == "soft_minimum"
+        if soft and self.exponent is None:
+            raise ValueError("over_seam 'soft_minimum' needs an exponent; add e.g. exponent = 8.0")
+        if not soft and self.exponent is not None:
+            raise ValueError(f"exponent is of over_seam 'soft_minimum', not of '{self.over_seam}'; remove it")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_usual(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave the mean unsaid, so that a cell's hash is the same whether or not it is stated."""
+        usual = {"over_seam": "mean", "exponent": None}
+        return {name: value for name, value in handler(self).items() if name not in usual or value != usual[name]}
 
 
 Band = tuple[Finite, Finite]

@@ -22,6 +22,10 @@ Branches = Annotated[
     str | None, typer.Option(metavar="front|any", help="inverse kinematics branches; the cell's own by default")
 ]
 Reading = Annotated[str | None, typer.Option(metavar="NAME", help="reading of eq. (16); the cell's own by default")]
+OverSeam = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="mean, minimum or soft_minimum:P of the points; the cell's own by default"),
+]
 Points = Annotated[int | None, typer.Option(help="seam points; the cell's own by default")]
 Formulation = Annotated[str, typer.Option(metavar="NAME", help="how the problem is written down")]
 TimeLimit = Annotated[float | None, typer.Option(min=0.0, help="time limit of a run [s]")]
@@ -52,12 +56,13 @@ def evaluate(
     ] = None,
     branches: Branches = None,
     reading: Reading = None,
+    over_seam: OverSeam = None,
     points: Points = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="keep the plan of this placement")] = None,
     json: Json = False,
 ) -> int:
     """Verify one placement along the whole seam."""
-    return ask.evaluate(ask.variant(cell, branches, reading, points), at, placement, out, json)
+    return ask.evaluate(ask.variant(cell, branches, ask.Goal(reading, over_seam), points), at, placement, out, json)
 
 
 @app.command()
@@ -70,15 +75,14 @@ def solve(
     evaluations: Evaluations = None,
     branches: Branches = None,
     reading: Reading = None,
+    over_seam: OverSeam = None,
     points: Points = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="keep the plan as DIR/plan.json")] = None,
     json: Json = False,
 ) -> int:
     """Find the best placement with one solver, and verify it."""
-    asked = ask.Question(
-        ask.variant(cell, branches, reading, points), solver, formulation, seed, time_limit, evaluations
-    )
-    return ask.solve(asked, out, json)
+    chosen = ask.variant(cell, branches, ask.Goal(reading, over_seam), points)
+    return ask.solve(ask.Question(chosen, solver, formulation, seed, time_limit, evaluations), out, json)
 
 
 @app.command()
@@ -107,6 +111,7 @@ def compare(
     memory_mb: Annotated[int | None, typer.Option(min=1, help="memory a run may take [MB]")] = None,
     branches: Branches = None,
     reading: Reading = None,
+    over_seam: OverSeam = None,
     points: Points = None,
     json: Json = False,
 ) -> int:
@@ -116,7 +121,7 @@ def compare(
     if from_file is not None:
         tasks = ask.tasks_of(from_file)
     else:
-        variants = [ask.variant(name, branches, reading, points) for name in cells or []]
+        variants = [ask.variant(name, branches, ask.Goal(reading, over_seam), points) for name in cells or []]
         tasks = ask.tasks(variants, solvers, formulation, seeds, (evaluations, time_limit), memory_mb)
     return study.compare(tasks, out, workers, scheduler, again, json)
 

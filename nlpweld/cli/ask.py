@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 from rich.console import Console
 
-from nlpweld.cell import READINGS, Cell, load_cell
+from nlpweld.cell import OVER_SEAM, READINGS, Cell, load_cell
 from nlpweld.errors import OptionError, OutputError
 from nlpweld.plan import Plan, load_plan
 
@@ -33,7 +33,55 @@ class Question:
     evaluations: int | None
 
 
-def variant(name: str, branches: str | None, reading: str | None, points: int | None) -> Cell:
+@dataclass(frozen=True)
+class Goal:
+    """What is to be maximised, as typed; None leaves it to the cell.
+
+    Attributes:
+        reading: how the robots' manipulabilities make one number.
+        over_seam: how those of the seam's points do; ``soft_minimum`` may be followed by a colon and its exponent.
+    """
+
+    reading: str | None
+    over_seam: str | None
+
+    def asked_of(self, cell: Cell) -> Cell:
+        """Return the cell with this for its objective.
+
+        Raises:
+            OptionError: no such reading, no such objective over the seam, or one that does not suit the cell.
+        """
+        fields: dict[str, Any] = {}
+        if self.reading is not None:
+            if self.reading not in READINGS:
+                raise OptionError(f"--reading '{self.reading}' is unknown. There are: {', '.join(READINGS)}")
+            fields["reading"] = self.reading
+        if self.over_seam is not None:
+            kind, _, exponent = self.over_seam.partition(":")
+            if kind not in OVER_SEAM:
+                raise OptionError(f"--over-seam '{kind}' is unknown. There are: {', '.join(OVER_SEAM)}")
+            fields |= {"over_seam": kind, "exponent": _exponent(exponent) if exponent else None}
+            if isinstance(cell.objective.source, dict):
+                others = {name: text for name, text in cell.objective.source.items() if name != "exponent"}
+                fields["source"] = others | ({"exponent": "command line"} if exponent else {})
+        try:
+            return cell.with_(objective=fields) if fields else cell
+        except ValidationError as error:
+            raise OptionError(f"{cell.name}: {_first_line(error)}") from None
+
+
+def _exponent(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise OptionError(f"--over-seam: exponent '{text}' is not a number; give e.g. soft_minimum:8") from None
+
+
+def _first_line(error: ValidationError) -> str:
+    return str(error.errors()[0]["msg"]).removeprefix("Value error, ")
+
+
+def variant(name: str, branches: str | None, goal: Goal, points: int | None) -> Cell:
     """Load a cell and apply the options that change it.
 
     Raises:
@@ -43,10 +91,7 @@ def variant(name: str, branches: str | None, reading: str | None, points: int | 
     from nlpweld.bench.answer import with_branches
 
     cell = with_branches(load_cell(name), branches)
-    if reading is not None:
-        if reading not in READINGS:
-            raise OptionError(f"--reading '{reading}' is unknown. There are: {', '.join(READINGS)}")
-        cell = cell.with_(objective={"reading": reading})
+    cell = goal.asked_of(cell)
     if points is not None:
         try:
             cell = cell.with_(seam={"points": points})

@@ -1,8 +1,9 @@
 """One candidate from placement to verdict, as plain loops over small arrays.
 
 Nothing here runs as it stands: :mod:`nlpweld.formulation.fused` compiles these functions in one module with the
-kernels of a cell's graphs, which they call as ``grip``, ``limbs``, ``work``, ``gap`` and ``value``, and with the
-constants ``N`` (seam points), ``CLOSED``, ``NEAR`` and ``GAP_SCALE_M``. Everything a candidate needs fits the innermost
+kernels of a cell's graphs, which they call as ``grip``, ``limbs``, ``work``, ``gap`` and ``value``, with ``over_seam``,
+which is one of the three below, and with the constants ``N`` (seam points), ``CLOSED``, ``NEAR``, ``GAP_SCALE_M`` and
+``EXPONENT``. Everything a candidate needs fits the innermost
 cache, nothing is written for it but its verdict, and what cannot change the verdict is not computed: these are the
 steps of the array form (:mod:`~.staged`), one candidate at a time.
 """
@@ -240,16 +241,36 @@ def missed_together(facts, scratch, choice):
     return worst
 
 
-def mean_value(scratch, choice):
-    """Return the mean objective over the seam on chosen branches, minus infinity where it is not a number."""
+def seam_mean(values):
+    """Return the mean over the seam."""
+    return values.sum() / N
+
+
+def seam_minimum(values):
+    """Return the least value over the seam; not a number where one is none."""
+    return least(values) if isfinite(values.sum()) else nan
+
+
+def seam_soft_minimum(values):
+    """Return the power mean over the seam with exponent -EXPONENT."""
+    low, total = seam_minimum(values), 0.0
+    if not low > 0.0:
+        return low
+    for j in range(N):
+        total += (low / values[j]) ** EXPONENT
+    return low * (total / N) ** (-1.0 / EXPONENT)
+
+
+def seam_value(scratch, choice):
+    """Return the objective over the seam on chosen branches, minus infinity where it is not a number."""
     for k in range(choice.shape[0]):
         if not scratch.seen[k, choice[k]]:
             return -inf
         scratch.w_chosen[k * N : (k + 1) * N] = scratch.w[k, choice[k]]
         scratch.gram_chosen[k * N : (k + 1) * N] = scratch.gram[k, choice[k]]
     value(1, scratch.w_chosen, scratch.gram_chosen, scratch.spare)
-    mean = scratch.spare.sum() / N
-    return mean if isfinite(mean) else -inf
+    found = over_seam(scratch.spare)
+    return found if isfinite(found) else -inf
 
 
 def missed_by(facts, scratch, choice, work_missed):
@@ -274,7 +295,7 @@ def judge(X, facts, scratch, objective, violation, mode):
             for k in range(choice.shape[0] - 1, -1, -1):
                 choice[k] = rest % branches
                 rest //= branches
-            total, mean = missed_by(facts, scratch, choice, work_missed), mean_value(scratch, choice)
-            if m == 0 or total < best or (total == best and mean > objective[i]):
-                best, objective[i], mode[i] = total, mean, m
+            total, found = missed_by(facts, scratch, choice, work_missed), seam_value(scratch, choice)
+            if m == 0 or total < best or (total == best and found > objective[i]):
+                best, objective[i], mode[i] = total, found, m
                 violation[i] = scratch.total

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nlpweld.cell.levels import Objective
 from nlpweld.formulation.freedom import FreeAngle
+from nlpweld.formulation.over_seam import smooth
 
 # (z (d, N), sharpness, slopes) -> values (N,), gradients (d, N), Hessians (d, d, N) at every seam point
 Lanes = Callable[[np.ndarray, float, bool], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -53,10 +55,28 @@ class Piece:
     Attributes:
         lanes: the function and its derivatives by (x, u) or (x, u, u of the next point).
         bases: for each block of angles the basis at its points, shapes (N, K).
+        objective: where the function is no summand but a value to be maximised over the seam, how (:mod:`~.over_seam`).
     """
 
     lanes: Lanes
     bases: tuple[np.ndarray, ...]
+    objective: Objective | None = None
+
+    def value(self, local: np.ndarray, sharpness: float) -> float:
+        """Return what the piece adds, at the variables of its points (d + blocks * f, N)."""
+        values = self.lanes(local, sharpness, False)[0]
+        return float(values.sum()) if self.objective is None else -smooth(self.objective, values, sharpness).value
+
+    def slopes(self, local: np.ndarray, sharpness: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return gradients (d + blocks * f, N) and Hessians to be summed, and by how much points couple.
+
+        The Hessian is the sum of Hessians plus that factor times the outer product of the summed gradient.
+        """
+        values, G, H = self.lanes(local, sharpness, True)
+        if self.objective is None:
+            return G, H, 0.0
+        over = smooth(self.objective, values, sharpness)
+        return -over.slope * G, over.bend * G[:, None] * G - over.slope * H, -over.shared
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +93,24 @@ class Assembly:
 
     def value(self, z: np.ndarray, sharpness: float) -> float:
         """Return the value at variables z (n,)."""
-        return float(sum(p.lanes(self._local(p, z), sharpness, False)[0].sum() for p in self.pieces))
+        return float(sum(p.value(self._local(p, z), sharpness) for p in self.pieces))
 
     def slopes(self, z: np.ndarray, sharpness: float) -> tuple[np.ndarray, np.ndarray]:
         """Return gradient (n,) and Hessian (n, n) at variables z (n,)."""
         gradient, hessian = np.zeros(len(z)), np.zeros((len(z), len(z)))
         for piece in self.pieces:
-            _, G, H = piece.lanes(self._local(piece, z), sharpness, True)
-            self._add(piece, G, H, gradient, hessian)
+            G, H, shared = piece.slopes(self._local(piece, z), sharpness)
+            own = np.zeros(len(z))
+            self._add(piece, G, H, own, hessian)
+            gradient += own
+            if shared:
+                hessian += shared * np.outer(own, own)
         return gradient, hessian
 
     def _local(self, piece: Piece, z: np.ndarray) -> np.ndarray:
         """Return the variables of a piece at every seam point, shape (d + blocks * f, N)."""
-        control = z[self.coding.d :].reshape(-1, len(self.coding.angles))
-        x = np.tile(z[: self.coding.d, None], len(piece.bases[0]))
+        control = z[self.coding.d :].reshape(self.coding.basis.shape[1], -1) if len(z) > self.coding.d else z[:0]
+        x = np.tile(z[: self.coding.d, None], len(piece.bases[0] if piece.bases else self.coding.basis))
         return np.concatenate([x, *((basis @ control).T for basis in piece.bases)])
 
     def _add(self, piece: Piece, G: np.ndarray, H: np.ndarray, gradient: np.ndarray, hessian: np.ndarray) -> None:

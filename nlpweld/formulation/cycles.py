@@ -57,11 +57,13 @@ class Chain:
         values: what each state is worth, one array (n_j,) per layer.
         links: from layer j to layer j + 1; those of a closed chain end with the ones from the last to the first.
         places: coordinates by which states of a layer are told apart, one array (n_j, f) per layer.
+        joined: how values along a path make its total: ``np.add``, or ``np.minimum`` for the least of them.
     """
 
     values: Sequence[np.ndarray]
     links: Sequence[Links]
     places: Sequence[np.ndarray]
+    joined: np.ufunc = np.add
 
     @property
     def closed(self) -> bool:
@@ -85,14 +87,15 @@ class Chain:
 
     def _turned(self, k: int) -> "Chain":
         """Return a closed chain that begins with layer k."""
-        return Chain(*([*part[k:], *part[:k]] for part in (self.values, self.links, self.places)))
+        values, links, places = ([*part[k:], *part[:k]] for part in (self.values, self.links, self.places))
+        return Chain(values, links, places, self.joined)
 
     def _totals(self, firsts: np.ndarray) -> list[np.ndarray]:
         """Return the greatest totals of paths from some first states to every state, one array per layer."""
         totals = [np.full(len(self.values[0]), -np.inf)]
         totals[0][firsts] = self.values[0][firsts]
         for links, values in zip(self.links, self.values[1:], strict=False):
-            totals.append(links.carry(totals[-1], len(values)) + values)
+            totals.append(self.joined(links.carry(totals[-1], len(values)), values))
         return totals
 
     def _trace(self, totals: list[np.ndarray], last: int) -> np.ndarray:
@@ -111,7 +114,7 @@ class Chain:
             for firsts in open_sets:
                 found = self._bound(firsts)
                 if found is not None:
-                    heapq.heappush(queue, (-found.bound, pushed, found))
+                    heapq.heappush(queue, (-found.bound, -pushed, found))  # of equals the last, which is the smallest
                     pushed += 1
             if not queue:
                 break

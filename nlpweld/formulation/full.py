@@ -6,6 +6,8 @@ The problem is large but sparse, for seam points share nothing but the placement
 Variables are the placement's coordinates [m; rad], then seam point after seam point the joints of all stations in
 their order [rad], in DH direction, and the point's free angles, if any (:mod:`~.full_redundant`). A positioner is the
 master: its joints follow from the seam alone and are none.
+Where the objective over the seam is not the mean, a level of MMR that all points share comes after the placement; it
+serves the descent alone.
 
 Branches are no choice here: shoulder, elbow and wrist are the signs of the three factors of |det J|, which a descent
 inherits from its start. Changing one means to pass |det J| = 0, and the penalty under the singularity floor stands
@@ -27,17 +29,20 @@ from nlpweld.formulation.freedom import FreeAngle, free_angles
 from nlpweld.formulation.holder import held
 from nlpweld.formulation.margins import with_margins
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
+from nlpweld.formulation.over_seam import over_seam
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, limit_margins, on_wrist, settle
 from nlpweld.formulation.seam_point import JOINTS, LEVER_M, SeamPoint, closure_function, facts_function, full_term
 from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps
 from nlpweld.formulation.stage import GAP_SCALE_M, Stage
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.ik import ELBOW, SHOULDER, WRIST, signs
+from nlpweld.kinematics.manipulability import magnitude
 from nlpweld.plan import Plan
 
 CONSTRAINTS = ("closure", "continuity", "branch", "joint_limit", "singularity", "clearance")
 CLOSED = 1e-7  # by how much a chain may be open at a point [m; rad]; a tenth of what the verifier allows
 HAIR = 1e-9  # by which bounds of joints lie inside their limits, so that rounding keeps the margin [rad]
+LEVELS = (1e-3, 1e3)  # bounds of a level, which is of order one
 SCOUTS = 256  # random placements of which the best are started from
 NEAREST = 32  # scouts that tell which bodies come near each other
 NEAR_M = 0.2  # and what is near
@@ -76,8 +81,10 @@ def full_start(plan: Plan, level: str | None = None) -> np.ndarray:
         if name not in names and np.any(offsets):
             raise OptionError(f"the plan turns {name}, which the form does not free; take a level that does")
     angles = [freedom.get(name, np.zeros(len(plan.s)))[:, None] for name in names]
-    own = np.hstack([plan.paths[station.name] for station in plan.cell.stations] + angles)
-    return np.concatenate([plan.cell.coordinates(plan.placement), own.ravel()])
+    joints = np.hstack([plan.paths[station.name] for station in plan.cell.stations])
+    x, plain = plan.cell.coordinates(plan.placement), Full(Batch(plan.cell, "numpy"))
+    shared = plain.with_level(x, joints.ravel())[: plain.arrow.shared]
+    return np.concatenate([shared, np.hstack([joints, *angles]).ravel()])
 
 
 @dataclass(frozen=True)
@@ -128,7 +135,7 @@ class Full:
     @cached_property
     def arrow(self) -> Arrow:
         """How variables are ordered."""
-        return Arrow(len(self.cell.variables), self.point.own, self.data)
+        return Arrow(len(self.cell.variables) + self.point.levels, self.point.own, self.data)
 
     @cached_property
     def facts(self) -> ca.Function:
@@ -141,13 +148,15 @@ class Full:
         need = np.radians(self.cell.constraints.joint_margin_deg) + HAIR
         limits = np.hstack([s.robot.limits_rad.T for s in self.cell.stations]) + np.array([[need], [-need]])
         bands = np.array([[a.lower, a.upper] for a in self.angles]).reshape(-1, 2).T
-        return np.hstack([self.cell.box, np.tile(np.hstack([limits, bands]), self.arrow.points)])
+        level = np.tile(LEVELS, (self.point.levels, 1)).T
+        return np.hstack([self.cell.box, level, np.tile(np.hstack([limits, bands]), self.arrow.points)])
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all variables."""
         own = [f"{s.name}.J{i + 1}" for s in self.cell.stations for i in range(JOINTS)] + [a.name for a in self.angles]
-        return (*self.cell.variables, *(f"{name}[{j}]_rad" for j in range(self.arrow.points) for name in own))
+        shared = (*self.cell.variables, *["level"] * self.point.levels)
+        return (*shared, *(f"{name}[{j}]_rad" for j in range(self.arrow.points) for name in own))
 
     def nlp(self, formulation: str, widened: Callable[[dict[str, float]], Nlp], rebuild: Callable[[], Nlp]) -> Nlp:
         """Return the form as solvers see it, by its name, how margins grow, and how another process builds it."""
@@ -194,9 +203,9 @@ class Full:
             "singularity": (floor - w.min(axis=(1, 2))) / (floor or 1.0),
             "clearance": (levels.clearance_at_points_m - gap.min(axis=(1, 2))) / GAP_SCALE_M,
         }
-        mean = mmr.mean(axis=(1, 2))
+        value = over_seam(self.cell.objective, mmr[..., 0])
         violation = np.maximum(0.0, np.column_stack([missed[name] for name in self.constraints]))
-        return Evaluation(np.where(np.isfinite(mean), mean, -np.inf), violation, self._modes(factors))
+        return Evaluation(np.where(np.isfinite(value), value, -np.inf), violation, self._modes(factors))
 
     def _missed_steps(self, longest: np.ndarray) -> dict[str, np.ndarray]:
         """Return by how many half turns joints' longest steps (m,) [rad] are too long."""
@@ -256,7 +265,7 @@ class Full:
     def unpack(self, z: np.ndarray, mode: int) -> Plan:
         """Return the plan of variables z (n,); its branches are those z is on, whatever the mode."""
         cell, z = self.cell, np.asarray(z, dtype=float)
-        x = z[: self.arrow.shared]
+        x = z[: len(cell.variables)]
         s, placement = seam_parameters(cell), cell.placement(x)
         q = self._settled(self.joints(z[None]))[0, ..., : self.arrow.points]
         paths = {station.name: q[k].T for k, station in enumerate(cell.stations)}
@@ -281,7 +290,16 @@ class Full:
         u = np.zeros((len(self.angles), self.arrow.points)) if angles is None else angles
         points = np.vstack([self.data, u])
         paths = [self._inverse(k, x, points, branch) for k, branch in enumerate(self.batch.modes[mode])]
-        return np.concatenate([x, np.vstack([*paths, u]).T.ravel()])
+        return self.with_level(x, np.vstack([*paths, u]).T.ravel())
+
+    def with_level(self, x: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Return variables (n,) of a placement (d,) and the points' own (N * own,), with their level if any."""
+        if not self.point.levels:
+            return np.concatenate([x, own])
+        z = np.concatenate([x, [1.0], own])
+        value = over_seam(self.cell.objective, self._judged(z[None])[4][..., 0])[0]
+        z[len(x)] = np.clip(value / magnitude(self.cell.objective.reading, self.cell.tight), *LEVELS)
+        return z
 
     def _scouted(self, seed: int, count: int) -> tuple[np.ndarray, Evaluation]:
         X = sobol(self.cell.box[0], self.cell.box[1], seed, count)

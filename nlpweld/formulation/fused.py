@@ -1,6 +1,7 @@
 """The exact model on Numba: a cell's kernels and the loops of :mod:`~.candidate`, compiled as one module."""
 
 import inspect
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,7 +22,7 @@ from nlpweld.formulation.staged import NEAR
 from nlpweld.kinematics.ik import ELBOW, SHOULDER, WRIST
 from nlpweld.kinematics.manipulability import mmr
 
-STEPS = (
+STEPS: tuple[Callable[..., Any], ...] = (
     candidate.least,
     candidate.greatest,
     candidate.lowest_end,
@@ -42,7 +43,7 @@ STEPS = (
     candidate.placed_limbs,
     candidate.sides,
     candidate.missed_together,
-    candidate.mean_value,
+    candidate.seam_value,
     candidate.missed_by,
     candidate.judge,
 )
@@ -57,7 +58,13 @@ N = {n}
 CLOSED = {closed}
 NEAR = {near!r}
 GAP_SCALE_M = {scale!r}
+EXPONENT = {exponent!r}
 """
+OVER_SEAM: dict[str, tuple[Callable[..., Any], ...]] = {
+    "mean": (candidate.seam_mean,),
+    "minimum": (candidate.seam_minimum,),
+    "soft_minimum": (candidate.seam_minimum, candidate.seam_soft_minimum),
+}  # the last of them is the one, the others are what it calls
 
 
 @dataclass(frozen=True)
@@ -151,12 +158,16 @@ def source(stage: Stage, n: int) -> str:
     kernels["work"] = stage.work, ("candidate", "point")
     kernels["gap"] = stage.gap, ("lane", "lane", "number")
     kernels["value"] = value_graph(stage.cell), ("lane", "lane")
-    parts = [TYPES + HEAD.format(n=n, closed=stage.cell.seam.closed, near=NEAR, scale=GAP_SCALE_M)]
+    closed, objective = stage.cell.seam.closed, stage.cell.objective
+    numbers = {"n": n, "closed": closed, "near": NEAR, "scale": GAP_SCALE_M, "exponent": objective.exponent}
+    parts = [TYPES + HEAD.format(**numbers)]
     parts += [INNER + kernel_source(f, kinds, n, name) for name, (f, kinds) in kernels.items()]
     stations = range(len(stage.grips))
     parts.append(_switch("grip", "x, points, signs, cos_sin, w, reach", stations))
     parts.append(_switch("limbs", "x, cos_sin, gram, ends", stations))
-    parts += [(JIT if f is candidate.judge else INNER) + inspect.getsource(f) for f in STEPS]
+    chosen = OVER_SEAM[objective.over_seam]
+    parts += [(JIT if f is candidate.judge else INNER) + inspect.getsource(f) for f in (*chosen, *STEPS)]
+    parts.append(f"over_seam = {chosen[-1].__name__}\n")
     return "\n\n".join(parts)
 
 

@@ -8,6 +8,9 @@ one seam point to the next, and on a closed seam from the last to the first, no 
 Joints that may turn more than once (4 and 6 of the usual arm) are the exception: how often they have turned is not
 part of a state, so that the search leaves their limits out. The answer is therefore judged as the redundant form
 judges its own, over unwrapped paths, and says whether it holds; where not, its value is still a bound on the grid.
+
+The mean over the seam is a sum of values, a power mean the sum of their powers, and the minimum the least value on the
+way: all three take the same search.
 """
 
 import time
@@ -20,6 +23,7 @@ import numpy as np
 
 from nlpweld.formulation.cycles import Chain, Links
 from nlpweld.formulation.lattice import TURN, Arm, Joints, Lattice, Owner
+from nlpweld.formulation.over_seam import Worth
 from nlpweld.formulation.redundant import STEP_MARGIN_DEG, Redundant
 
 COUNTS = {1: 72, 2: 36}  # values of each of so many spins and yaws
@@ -32,7 +36,7 @@ class Inner:
 
     Attributes:
         x: the placement's coordinates, shape (d,) [m; rad].
-        value: mean objective over the seam points.
+        value: the cell's objective over the seam points.
         angles: name of a free angle to its value at every seam point, shape (N,) [rad].
         mode: index of the arm branches in the form's modes.
         states: feasible states of that mode at every seam point, shape (N,).
@@ -105,16 +109,22 @@ def spread(lower: float, upper: float, count: int) -> np.ndarray:
     return np.linspace(lower, upper, count) if upper - lower < TURN - 1e-9 else np.arange(count) * TURN / count - np.pi
 
 
-def best(states: Lattice, x: np.ndarray, mode: int | None = None, banded: bool = False) -> Inner | None:
-    """Return the best paths over a lattice at a placement x (d,), see :func:`inner`."""
+def best(
+    states: Lattice, x: np.ndarray, mode: int | None = None, banded: bool = False, exponent: float | None = None
+) -> Inner | None:
+    """Return the best paths over a lattice at a placement x (d,), see :func:`inner`.
+
+    With an exponent, they are the best by that power mean, whatever the cell's objective, and so is their value.
+    """
     began, x, form = time.perf_counter(), np.asarray(x, dtype=float), states.form
-    found = _Search(states, x, banded).best(range(len(form.batch.modes)) if mode is None else [mode])
+    worth = Worth.of(form.cell, exponent)
+    found = _Search(states, x, banded, worth).best(range(len(form.batch.modes)) if mode is None else [mode])
     if found is None:
         return None
     paths = states.angles(found.path)
     return Inner(
         x=x,
-        value=found.total / len(found.path),
+        value=worth.value(found.total, len(found.path)),
         angles=dict(zip(form.names, paths, strict=True)),
         mode=found.mode,
         states=found.counts,
@@ -174,6 +184,7 @@ class _Search:
     states: Lattice
     x: np.ndarray
     banded: bool
+    worth: Worth
     arms: dict[tuple[int, tuple[str, str]], Arm] = field(default_factory=dict)
     met: dict[tuple[object, ...], np.ndarray] = field(default_factory=dict)
 
@@ -188,7 +199,7 @@ class _Search:
     def best(self, modes: range | list[int]) -> _Found | None:
         """Return the best path of some modes, those that promise most looked at first."""
         tried = [(mode, joints, values) for mode in modes for joints, values in self._variants(mode)]
-        bounds = np.array([values.max(axis=1).sum() for _, _, values in tried])
+        bounds = np.array([self.worth.joined.reduce(values.max(axis=1)) for _, _, values in tried])
         found: _Found | None = None
         for i in np.argsort(-bounds, kind="stable"):
             if not np.isfinite(bounds[i]) or (found is not None and bounds[i] <= found.total):
@@ -212,7 +223,7 @@ class _Search:
             if key not in self.met:
                 self.met[key] = self.states.apart(k, arms[k].owner, l, arms[l].owner)
             clear = clear & self.met[key]
-        values = self.states.values(arms, clear)
+        values = self.worth.summands(self.states.values(arms, clear))
         for joints in self.states.choices(arms):
             ok = np.broadcast_to(np.all(np.broadcast_arrays(*(j.ok for j in joints)), axis=0), values.shape)
             yield joints, np.where(ok, values, -np.inf).reshape(len(values), -1)
@@ -227,9 +238,9 @@ class _Search:
         N, closed = len(kept), self.form.cell.seam.closed
         places = [self.states.rows(k) for k in kept]
         if min(len(k) for k in kept) == 0:
-            return Chain([row[k] for row, k in zip(values, kept, strict=True)], [], places)
+            return Chain([row[k] for row, k in zip(values, kept, strict=True)], [], places)  # which has no path
         links = [self._links(joints, kept, j, (j + 1) % N) for j in range(N if closed else N - 1)]
-        return Chain([row[k] for row, k in zip(values, kept, strict=True)], links, places)
+        return Chain([row[k] for row, k in zip(values, kept, strict=True)], links, places, self.worth.joined)
 
     def _links(self, joints: tuple[Joints, ...], kept: list[np.ndarray], j: int, ahead: int) -> Links:
         """Return which states at seam point j may be followed by which ahead: robots that few angles move come first.

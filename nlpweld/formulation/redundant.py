@@ -23,7 +23,7 @@ from nlpweld.formulation.margins import with_margins
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.paths import limit_margins
 from nlpweld.formulation.reduced import OutOfReach, Unpacker
-from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps, step_function, term_function
+from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps, step_function, term_function, value_pieces
 from nlpweld.formulation.splines import basis
 from nlpweld.formulation.stage import Stage
 from nlpweld.formulation.staged import Staged
@@ -36,6 +36,7 @@ REDUNDANT = {"spin": "redundant_spin", "spin_yaw": "redundant_spin_yaw", "spin_y
 CONTROL_POINTS = 24
 TURNS = 32  # angles that are screened, a divisor of SAMPLES
 LIMITS = CONSTRAINTS.index("joint_limit")
+NEAR_MINIMUM = 32.0  # exponent of the power mean that stands for the minimum where paths on a grid are a start
 STEP_MARGIN_DEG = 0.05  # by which solvers stay under the bound on joint steps
 
 
@@ -225,7 +226,9 @@ class Redundant:
         """
         from nlpweld.formulation.inner import best, start
 
-        found = best(self._lattice, z[: self.coding.d], mode, banded=True)
+        # where only the least value counts, paths are any elsewhere, which makes a poor start
+        exponent = NEAR_MINIMUM if self.cell.objective.over_seam == "minimum" else None
+        found = best(self._lattice, z[: self.coding.d], mode, banded=True, exponent=exponent)
         return None if found is None else start(self, found).z
 
     def relax(self, mode: int, whole: bool = False) -> Relaxation:
@@ -240,6 +243,7 @@ class Redundant:
         pieces = [
             Piece(lanes_of(term, self.data, engine), (B,)),
             Piece(lanes_of(step, pair, engine), (B[here], B[ahead][here])),
+            *value_pieces(self.stage, branches, self.data, (B,), engine),
         ]
         whole_sum = Assembly(self.coding, pieces)
         return by_functions(whole_sum.value, whole_sum.slopes, len(self.coding.bounds[0]))

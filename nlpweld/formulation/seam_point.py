@@ -5,13 +5,16 @@ from functools import cached_property
 
 import casadi as ca
 
+from nlpweld.cell.levels import Objective
 from nlpweld.formulation.coupling import WeldPoint, base_frame, placement_frame, tcp_pose, weld_point
+from nlpweld.formulation.over_seam import LEAST
 from nlpweld.formulation.smooth import Gaps, chosen_gaps, softened
 from nlpweld.formulation.stage import GAP_SCALE_M, Stage
 from nlpweld.kinematics.chain import Chain, Frame, constant, rpy_pose
 from nlpweld.kinematics.ik import Solution, SphericalArm, spherical_arm
 from nlpweld.kinematics.manipulability import magnitude, mmr
 
+LEVEL_WEIGHT = 2.0  # of a point's value below the level: twice the greatest multiplier there can be
 LEVER_M = 1.0  # a position error this long counts as much as a turn of one radian: about the arms' own length
 JOINTS = 6  # of every station: what has a closed-form manipulability
 
@@ -19,6 +22,8 @@ JOINTS = 6  # of every station: what has a closed-form manipulability
 @dataclass(frozen=True)
 class SeamPoint:
     """Expressions of one seam point in its variables y: placement, then all stations' joints, then free angles.
+
+    Between them comes a level of MMR, where the objective over the seam is another than the mean (:func:`full_term`).
 
     Attributes:
         stage: the cell's graphs; its free angles are this point's.
@@ -36,6 +41,11 @@ class SeamPoint:
         """Number of the point's own variables: joints and free angles."""
         return self.joints + len(self.stage.free)
 
+    @property
+    def levels(self) -> int:
+        """Number of levels: one or none."""
+        return int(self.stage.cell.objective.over_seam != "mean")
+
     @cached_property
     def weld(self) -> WeldPoint:
         """What is known of the point, and its free angles."""
@@ -49,10 +59,15 @@ class SeamPoint:
     def _q(self) -> ca.SX:
         return ca.SX.sym("q", self.joints)
 
+    @cached_property
+    def level(self) -> ca.SX:
+        """The level of MMR that all points share, of order one, shape (levels, 1)."""
+        return ca.SX.sym("level", self.levels)
+
     @property
     def inputs(self) -> list[ca.SX]:
-        """What every graph here takes: variables y (d + own, 1) [m; rad], and what is known of the point."""
-        return [ca.vertcat(self._x, self._q, self.weld.free), self.weld.data]
+        """What every graph here takes: variables y (d + levels + own, 1) [m; rad], and what is known of the point."""
+        return [ca.vertcat(self._x, self.level, self._q, self.weld.free), self.weld.data]
 
     @cached_property
     def cos_sin(self) -> list[tuple[ca.SX, ca.SX]]:
@@ -131,13 +146,30 @@ def full_term(point: SeamPoint, gaps: Gaps, n: int) -> ca.Function:
 
     As in the reduced form (:func:`~.smooth.relaxation`), less the penalties for reach, which closure makes needless,
     and for joint limits, which are bounds of variables.
+
+    Another objective over the seam than the mean would couple all points, and the Hessian were dense. A level t that
+    all points share keeps the sum: over t, the greatest of ``t - 2 sum_j softplus(s (t - m_j)) / s`` tends to the
+    minimum of the m_j as the sharpness s grows, and ``t - t/p (1/N sum_j (t/m_j)^p - 1)`` is greatest where t is
+    their power mean with exponent -p, and is that power mean there.
     """
     cell, sharpness = point.stage.cell, ca.SX.sym("sharpness")
     floor, level = cell.constraints.floor_at_points_m3, cell.constraints.clearance_at_points_m
     kept = [w / (floor or 1.0) - float(floor > 0) for w in point.w]
     penalty = softened([*kept, (point.gaps(gaps) - level) / GAP_SCALE_M], sharpness)
-    term = penalty - point.mmr / magnitude(cell.objective.reading, cell.tight) / n
+    value = point.mmr / magnitude(cell.objective.reading, cell.tight)
+    if cell.objective.over_seam == "mean":
+        term = penalty - value / n
+    else:
+        term = penalty - point.level / n + _below(cell.objective, value, point.level, sharpness, n)
     return ca.Function("term", [*point.inputs, sharpness], [term], {"cse": True})
+
+
+def _below(objective: Objective, value: ca.SX, level: ca.SX, sharpness: ca.SX, n: int) -> ca.SX:
+    """Return what one of n points takes off the level by its value."""
+    if objective.exponent is None:
+        return LEVEL_WEIGHT * softened([value - level], sharpness)
+    p = objective.exponent
+    return level / (p * n) * ((level / ca.fmax(value, LEAST)) ** p - 1)
 
 
 def facts_function(point: SeamPoint, gaps: Gaps) -> ca.Function:

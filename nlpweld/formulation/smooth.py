@@ -8,8 +8,9 @@ import numpy as np
 
 from nlpweld.cell.cell import Cell
 from nlpweld.cell.robot import Robot
+from nlpweld.formulation.coded import Assembly, Coding, Piece
 from nlpweld.formulation.coupling import point_data
-from nlpweld.formulation.derivatives import DERIVATIVES
+from nlpweld.formulation.derivatives import DERIVATIVES, by_functions, lanes_of
 from nlpweld.formulation.nlp import Relaxation
 from nlpweld.formulation.stage import GAP_SCALE_M, Owners, Stage
 from nlpweld.geometry.seam import seam_parameters
@@ -70,7 +71,8 @@ def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, engine: str =
     Minimise  -mean_j MMR_j + sum_j sum_c softplus(-sharpness * g_jc) / sharpness  over the placement x, where
     g_jc >= 0 are the constraints of seam point j, each scaled to order one. Once the weight, one, exceeds twice
     a constraint's multiplier, the minimiser lies on the feasible side, the nearer the sharper. MMR counts in a unit
-    that keeps it of order one, whatever the reading.
+    that keeps it of order one, whatever the reading. Where the cell asks for another objective over the seam than the
+    mean, that stands in its place (:mod:`~.over_seam`).
 
     Args:
         stage: the cell's graphs, without free angles.
@@ -80,13 +82,40 @@ def relaxation(stage: Stage, mode: Mode, gaps: Gaps | None = None, engine: str =
     """
     points = point_data(stage.cell, seam_parameters(stage.cell))
     term = term_function(stage, mode, gaps or all_gaps(stage), points.shape[1])
-    return DERIVATIVES[engine](term, points)
+    apart = value_pieces(stage, mode, points, (), engine)
+    if not apart:
+        return DERIVATIVES[engine](term, points)
+    coding = Coding(stage.cell.box, (), np.empty((points.shape[1], 0)))
+    whole = Assembly(coding, [Piece(lanes_of(term, points, engine), ()), *apart])
+    return by_functions(whole.value, whole.slopes, coding.d)
+
+
+def value_pieces(
+    stage: Stage, mode: Mode, points: np.ndarray, bases: tuple[np.ndarray, ...], engine: str
+) -> list[Piece]:
+    """Return the objective over the seam as a piece, or none where it is a sum and so part of the points' terms.
+
+    Args:
+        stage: the cell's graphs.
+        mode: (shoulder, elbow) of every station.
+        points: the data of every seam point, shape (k, N).
+        bases: of the free angles, shape (N, K), if there are any.
+        engine: as of :func:`relaxation`.
+    """
+    objective = stage.cell.objective
+    if objective.over_seam == "mean":
+        return []
+    z, data, x, point = _variables(stage)
+    arms = [arm(x, point, _branch(b)) for arm, b in zip(stage.arms, mode, strict=True)]
+    value = ca.Function("value", [z, data, ca.SX.sym("sharpness")], [_value(stage.cell, arms)], {"cse": True})
+    return [Piece(lanes_of(value, points, engine), bases, objective)]
 
 
 def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
-    """Return ``(x, point, sharpness) ->`` what one of n seam points adds to the objective.
+    """Return ``(x, point, sharpness) ->`` what one of n seam points adds to what is minimised.
 
-    The free angles of the point, if the stage has any, follow the placement's coordinates in x.
+    That is its penalties and, where the objective is the mean over the seam, its share of it. The free angles of the
+    point, if the stage has any, follow the placement's coordinates in x.
     """
     cell, sharpness = stage.cell, ca.SX.sym("sharpness")
     z, data, x, point = _variables(stage)
@@ -96,9 +125,9 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
         constraints.append(stage.table(point)[1])
     ends = [*(arm[4] for arm in arms), stage.work(x, point)]
     constraints.append((chosen_gaps(stage, gaps, ends) - cell.constraints.clearance_at_points_m) / GAP_SCALE_M)
-    tight, reading = cell.tight, cell.objective.reading
-    value = mmr(reading, [a[1] for a in arms], [a[2] for a in arms], tight) / magnitude(reading, tight)
-    term = -value / n + softened(constraints, sharpness)
+    term = softened(constraints, sharpness)
+    if cell.objective.over_seam == "mean":
+        term = -_value(cell, arms) / n + term
     return ca.Function("term", [z, data, sharpness], [term], {"cse": True})
 
 
@@ -132,6 +161,12 @@ def step_penalty(cosines: Iterable[ca.SX], bound: float, sharpness: ca.SX) -> ca
     """Return the penalty on joints that turn by more than a bound [rad], from the cosines of what they turn by."""
     gaps = [(cosine - np.cos(bound)) / (1 - np.cos(bound)) for cosine in cosines]
     return STEP_WEIGHT * softened(gaps, sharpness)
+
+
+def _value(cell: Cell, arms: Sequence[tuple[ca.SX, ...]]) -> ca.SX:
+    """Return the MMR of one seam point in a unit that keeps it of order one."""
+    tight, reading = cell.tight, cell.objective.reading
+    return mmr(reading, [a[1] for a in arms], [a[2] for a in arms], tight) / magnitude(reading, tight)
 
 
 def _variables(stage: Stage) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

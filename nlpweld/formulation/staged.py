@@ -14,6 +14,7 @@ from nlpweld.engine.lanes import Kernel, Lanes, joined, rows
 from nlpweld.engine.numpy_kernels import lower, numpy_kernel
 from nlpweld.formulation.clearance import Meeting, boxes
 from nlpweld.formulation.nlp import Evaluation
+from nlpweld.formulation.over_seam import over_seam
 from nlpweld.formulation.paths import Limits, allowed, best_wrist
 from nlpweld.formulation.stage import GAP_SCALE_M, Owners, Stage
 from nlpweld.kinematics.ik import ELBOW, SHOULDER, WRIST
@@ -129,7 +130,7 @@ class Staged:
             missed = np.max([side.missed for side in chosen], axis=0)
             missed[:, 3] = np.maximum(missed[:, 3], work)
             missed[:, 3] = np.maximum(missed[:, 3], self._met(sides, choice, met))
-            _keep_better(best, self._mmr(chosen), missed, mode)
+            _keep_better(best, self._value(chosen), missed, mode)
         return best
 
     def _side(self, k: int, X: np.ndarray, branch: tuple[str, str]) -> Side:
@@ -221,13 +222,13 @@ class Staged:
     def _missed_gap(self, gap: np.ndarray) -> np.ndarray:
         return np.maximum(0.0, self._level - gap) / GAP_SCALE_M
 
-    def _mmr(self, chosen: list[Side]) -> np.ndarray:
-        """Return the mean MMR of the candidates all chosen sides looked at, -inf for the others, shape (m,)."""
+    def _value(self, chosen: list[Side]) -> np.ndarray:
+        """Return the objective of the candidates all chosen sides looked at, -inf for the others, shape (m,)."""
         seen = np.flatnonzero(np.all([side.slot >= 0 for side in chosen], axis=0))
         w, gram = ([getattr(side, name)[side.slot[seen]] for side in chosen] for name in ("w", "gram"))
         objective = np.full(len(chosen[0].slot), -np.inf)
         with np.errstate(all="ignore"):  # without a floor, w and gram may be zero
-            value = mmr(self.cell.objective.reading, w, gram, self.cell.tight).mean(axis=1)
+            value = over_seam(self.cell.objective, mmr(self.cell.objective.reading, w, gram, self.cell.tight))
         objective[seen] = np.where(np.isfinite(value), value, -np.inf)
         return objective
 

@@ -16,7 +16,7 @@ HEAD = ("cell", "formulation", "solver", "preset", "seed")
 PLAIN = (*HEAD, "status", "message")
 NUMBERS = ("claimed_objective", "evaluations", "build_s", "solve_s", "wall_s", "variables")
 MEASURES = (
-    "mmr_mean", "mmr_min", "mmr_max", "m_tight_mean", "m_loose_mean",
+    "mmr_mean", "mmr_min", "mmr_max", "mmr_min_along", "m_tight_mean", "m_loose_mean",
     "clearance_m", "joint_margin_rad", "joint_step_rad", "closure_m", "closure_rad",
 )  # fmt: skip
 PER_ROBOT = ("manipulability_mean", "manipulability_min", "singularity_min")
@@ -93,6 +93,8 @@ def report_row(report: dict[str, Any] | None) -> dict[str, Any]:
     """Return a report's numbers in one flat row."""
     report = report or {}
     flat: dict[str, Any] = {"feasible": report.get("feasible") is True, "reading": report.get("reading")}
+    flat |= {"over_seam": report.get("over_seam", "mean"), "exponent": _number(report.get("exponent"))}
+    flat["objective"] = _number(report.get("objective", report.get("mmr_mean")))  # older reports know the mean alone
     flat |= {name: _number(report.get(name)) for name in MEASURES}
     for name in PER_ROBOT:
         flat |= {f"{name}_{robot}_m3": _number(value) for robot, value in (report.get(name) or {}).items()}

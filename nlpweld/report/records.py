@@ -25,6 +25,16 @@ def load_records(folder: str | Path) -> pd.DataFrame:
     return runs_frame((record for _, record in found), file=files)
 
 
+def maximised(row: pd.Series) -> str:
+    """Return in words what a run or baseline maximises: the robots' measure, and what of it over the seam."""
+    reading, over = row.get("reading"), row.get("over_seam", "mean")
+    names = {"paper": "MMR", "product": "product of w", "mean": "mean of w"}
+    what = names.get(reading, f"MMR ({reading})") if isinstance(reading, str) else "MMR"
+    if over == "minimum":
+        return f"least {what}"
+    return f"soft least {what} (p = {row['exponent']:g})" if over == "soft_minimum" else what
+
+
 def load_traces(folder: str | Path) -> pd.DataFrame:
     """Return every step of every run of a study (:func:`~nlpweld.records.frames.traces_frame`).
 
@@ -49,7 +59,7 @@ def load_baselines(folder: str | Path) -> pd.DataFrame:
             rows.append({"name": str(data["name"]), "cell": str(data["cell"]), **at, **report_row(data["report"])})
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise OutputError(f"{path}: not a baseline ({_what(error)}); write it again") from None
-    return pd.DataFrame(rows, columns=None if rows else ["name", "cell", *AXES, "feasible", *MEASURES])
+    return pd.DataFrame(rows, columns=None if rows else ["name", "cell", *AXES, "feasible", "objective", *MEASURES])
 
 
 def load_reference(folder: str | Path) -> pd.Series:

@@ -47,7 +47,7 @@ class Statistics:
         whichever is better. The second flatters whoever found it, so :attr:`reference_kind` says which it is.
         """
         good = self.runs[self.runs["verified"]]
-        best = good.groupby(PROBLEM)["mmr_mean"].max()
+        best = good.groupby(PROBLEM)["objective"].max()
         stated = {(cell, "reduced"): value for cell, value in self.stated.items()}
         index = best.index.union(pd.MultiIndex.from_tuples(stated, names=PROBLEM)) if stated else best.index
         return best.reindex(index).combine(pd.Series(stated, index=index, dtype=float), np.fmax)
@@ -65,7 +65,7 @@ class Statistics:
     @cached_property
     def judged(self) -> pd.DataFrame:
         """Runs with ``objective``, ``regret`` and the ``label`` of their solver."""
-        runs = self.runs.assign(objective=self.runs["mmr_mean"])
+        runs = self.runs.copy()
         preset = runs["preset"].where(runs["preset"] != "default", "")
         runs["label"] = runs["solver"] + preset.map(lambda p: f":{p}" if p else "")
         return runs.assign(regret=regrets(runs, self.reference))

@@ -10,23 +10,23 @@ from rich.table import Table
 from nlpweld.plan import write_bytes, write_text
 from nlpweld.records.frames import AXES
 from nlpweld.report.markup import latex, markdown
-from nlpweld.report.records import load_reference
+from nlpweld.report.records import load_reference, maximised
 from nlpweld.report.statistics import as_text as statistics_as_text
 from nlpweld.report.study import Study
 
 GROUP = ["cell", "formulation", "solver", "preset"]
 HEADINGS = {
-    "runs": "runs", "claimed": "solved", "verified": "verified", "mmr": "MMR mean ± sd", "mmr_best": "best",
-    "mmr_share_percent": "% of best", "regret_percent": "regret %", "evaluations_median": "evals",
+    "runs": "runs", "claimed": "solved", "verified": "verified", "objective": "mean ± sd", "objective_best": "best",
+    "share_percent": "% of best", "regret_percent": "regret %", "evaluations_median": "evals",
     "build_median_s": "build s", "solve_median_s": "solve s", "to_reference_mm": "to C mm",
 }  # fmt: skip
 FORMATS = {
-    "runs": "{:.0f}", "claimed": "{:.0f}", "verified": "{:.0f}", "mmr_best": "{:.5f}", "mmr_share_percent": "{:.2f}",
+    "runs": "{:.0f}", "claimed": "{:.0f}", "verified": "{:.0f}", "objective_best": "{:.5f}", "share_percent": "{:.2f}",
     "regret_percent": "{:z.3f}", "evaluations_median": "{:.0f}", "build_median_s": "{:.2f}", "solve_median_s": "{:.2f}",
     "to_reference_mm": "{:.1f}",
 }  # fmt: skip
 NARROW = {
-    "verified": "veri-\nfied", "MMR mean ± sd": "MMR\nmean ± sd", "% of best": "% of\nbest", "regret %": "regret\n[%]",
+    "verified": "veri-\nfied", "% of best": "% of\nbest", "regret %": "regret\n[%]",
     "evals": "evals\nmedian", "build s": "build\n[s]", "solve s": "solve\n[s]", "to C mm": "to C\n[mm]",
 }  # fmt: skip
 SMALLEST_SPREAD = 1e-5  # what five decimals can show
@@ -67,7 +67,8 @@ def summary(runs: pd.DataFrame, baselines: pd.DataFrame, reference: pd.Series | 
     """Return the summary of runs and baselines.
 
     Mean, spread, best, share and distance are over verified runs alone; medians are over all runs that came to an
-    end by themselves. ``mmr_share_percent`` is the mean as a share of the best verified MMR in the same cell;
+    end by themselves. ``share_percent`` is the mean as a share of the best verified objective in the same cell;
+    ``objective_*`` are of what the row's runs maximise, which ``maximised`` says;
     ``to_reference_mm`` the distance of the row's best placement from the cell's first baseline (the paper's C). With a
     reference, ``regret_percent`` is by how much of it the mean falls short, and stands in place of the distance.
 
@@ -79,16 +80,17 @@ def summary(runs: pd.DataFrame, baselines: pd.DataFrame, reference: pd.Series | 
     rows = [{**dict(zip(GROUP, key, strict=True)), **_solver_row(group)} for key, group in runs.groupby(GROUP)]
     rows += [_baseline_row(row) for _, row in baselines.iterrows()]
     table = pd.DataFrame(rows)
-    best = table.groupby("cell")["mmr_best"].transform("max")
-    table["mmr_share_percent"] = 100 * table["mmr_mean"] / best
+    best = table.groupby("cell")["objective_best"].transform("max")
+    table["share_percent"] = 100 * table["objective_mean"] / best
     if reference is None or reference.empty:
         table["to_reference_mm"] = _distance_mm(table, baselines)
     else:
         best = reference.reindex(table["cell"]).to_numpy()
-        table["regret_percent"] = (100 * (best - table["mmr_mean"]) / best).round(9) + 0.0
+        table["regret_percent"] = (100 * (best - table["objective_mean"]) / best).round(9) + 0.0
     table = table.astype(dict.fromkeys(COUNTS, "Int64"))
-    order = [*GROUP, *("mmr_mean" if name == "mmr" else name for name in HEADINGS if name == "mmr" or name in table)]
-    order.insert(order.index("mmr_mean") + 1, "mmr_std")
+    named = ("objective_mean" if name == "objective" else name for name in HEADINGS)
+    order = [*GROUP, "maximised", *(name for name in named if name in table)]
+    order.insert(order.index("objective_mean") + 1, "objective_std")
     order.insert(order.index("verified") + 1, "failed")
     return table.sort_values("cell", kind="stable")[[*order, *AXES]].reset_index(drop=True)
 
@@ -105,9 +107,12 @@ def format_summary(table: pd.DataFrame, width: int = 100) -> Table:
         text = text.drop(columns=["best", "build s"])
     shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
     for name in text.columns:
-        left = name == "solver"
+        left = name in ("solver", "maximised")
         shown.add_column(
-            escape(NARROW.get(name, name)), justify="left" if left else "right", overflow="fold", no_wrap=not left
+            escape(NARROW.get(name, name.replace(" mean ±", "\nmean ±"))),
+            justify="left" if left else "right",
+            overflow="fold",
+            no_wrap=not left,
         )
     previous = None
     for cell, values in zip(table["cell"], text.to_numpy(), strict=True):
@@ -126,29 +131,36 @@ def as_text(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _solver_row(group: pd.DataFrame) -> dict[str, object]:
-    good = group[group["verified"] & group["mmr_mean"].notna()]
+    good = group[group["verified"] & group["objective"].notna()]
     ended = group[~group["status"].isin(["FAILED", "SKIPPED"])]
     row: dict[str, object] = {
         "runs": len(group),
         "claimed": int(group["claimed"].sum()),
         "verified": len(good),
         "failed": int((group["status"] == "FAILED").sum()),
-        "mmr_mean": good["mmr_mean"].mean(),
-        "mmr_std": good["mmr_mean"].std(),
-        "mmr_best": good["mmr_mean"].max(),
+        "maximised": maximised(_told(group).iloc[0]),
+        "objective_mean": good["objective"].mean(),
+        "objective_std": good["objective"].std(),
+        "objective_best": good["objective"].max(),
         "evaluations_median": ended["evaluations"].median(),
         "build_median_s": ended["build_s"].median(),
         "solve_median_s": ended["solve_s"].median(),
     }
-    best = good.loc[good["mmr_mean"].idxmax()] if len(good) else None
+    best = good.loc[good["objective"].idxmax()] if len(good) else None
     return row | {axis: np.nan if best is None else best[axis] for axis in AXES}
 
 
+def _told(runs: pd.DataFrame) -> pd.DataFrame:
+    """Return the runs whose report says what they maximise, or all if none does."""
+    return runs[runs["reading"].notna()] if runs["reading"].notna().any() else runs
+
+
 def _baseline_row(baseline: pd.Series) -> dict[str, object]:
-    """Return a baseline's row; its MMR counts only if the verifier found it feasible."""
-    mmr = baseline["mmr_mean"] if baseline["feasible"] else np.nan
+    """Return a baseline's row; its objective counts only if the verifier found it feasible."""
+    value = baseline["objective"] if baseline["feasible"] else np.nan
     row = {"cell": baseline["cell"], "formulation": "", "solver": baseline["name"], "preset": ""}
-    row |= {"verified": int(baseline["feasible"]), "mmr_mean": mmr, "mmr_best": mmr}
+    row |= {"maximised": maximised(baseline), "verified": int(baseline["feasible"])}
+    row |= {"objective_mean": value, "objective_best": value}
     return row | {axis: baseline[axis] for axis in AXES}
 
 
@@ -163,11 +175,14 @@ def _as_text(table: pd.DataFrame) -> pd.DataFrame:
     """Return the summary as strings under the headings people read, blank where there is nothing to say."""
     text = pd.DataFrame(index=table.index)
     text["solver"] = [_label(row, table["formulation"]) for _, row in table.iterrows()]
+    several = table["maximised"].nunique() > 1
     for name, heading in HEADINGS.items():
-        if name != "mmr" and name not in table:
-            continue
-        values = _mean_and_spread(table) if name == "mmr" else [_shown(v, FORMATS[name]) for v in table[name]]
-        text[heading] = values
+        if name == "objective":
+            if several:
+                text["maximised"] = table["maximised"]
+            text[f"{'' if several else table['maximised'].iloc[0] + ' '}{heading}"] = _mean_and_spread(table)
+        elif name in table:
+            text[heading] = [_shown(v, FORMATS[name]) for v in table[name]]
     return text
 
 
@@ -179,7 +194,7 @@ def _label(row: pd.Series, formulations: pd.Series) -> str:
 
 
 def _mean_and_spread(table: pd.DataFrame) -> list[str]:
-    pairs = zip(table["mmr_mean"], table["mmr_std"], strict=True)
+    pairs = zip(table["objective_mean"], table["objective_std"], strict=True)
     return [_shown(m, "{:.5f}") + _spread(s) for m, s in pairs]
 
 

@@ -9,7 +9,7 @@ from nlpweld.plan import Plan, joint_counts, wrong_freedom, wrong_points
 from nlpweld.verify import rules
 from nlpweld.verify.between import whole_motion
 from nlpweld.verify.freedom import Offsets
-from nlpweld.verify.measures import Measures, measure
+from nlpweld.verify.measures import Measures, along_seam, least_along, measure
 from nlpweld.verify.report import Report, Violation, worst_first
 from nlpweld.verify.scene import Scene, joint_steps, look
 
@@ -54,9 +54,13 @@ def _report(plan: Plan, scene: Scene, measures: Measures, violations: tuple[Viol
         yaw_rad=float(plan.yaw_rad),
         n_points=len(plan.s),
         reading=plan.cell.objective.reading,
+        over_seam=plan.cell.objective.over_seam,
+        exponent=plan.cell.objective.exponent,
+        objective=along_seam(plan.cell.objective, measures.mmr),
         mmr_mean=float(measures.mmr.mean()),
         mmr_min=float(measures.mmr.min()),
         mmr_max=float(measures.mmr.max()),
+        mmr_min_along=least_along(plan.cell, scene.w, {name: J[:, :3] for name, J in scene.J.items()}),
         m_tight_mean=float(measures.m_tight.mean()),
         m_loose_mean=float(measures.m_loose.mean()),
         manipulability_mean={name: float(w[at].mean()) for name, w in scene.w.items()},

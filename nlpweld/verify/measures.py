@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from nlpweld.cell import Cell
+from nlpweld.cell.levels import Objective
 
 DIRECTIONS = 2000
 MM3_PER_M3 = 1e9
@@ -22,7 +23,7 @@ class Measures:
     """Measures at M configurations.
 
     Attributes:
-        mmr: the cell's objective: a reading of eq. (16), or product or mean of all w, shape (M,).
+        mmr: value of the cell's reading: one of eq. (16), or product or mean of all w, shape (M,).
         m_tight: product of the tight robots' w (eq. 15), shape (M,) [m^3 each]; NaN where there are none.
         m_loose: product of the loose robots' w, shape (M,).
         common_volume: Vol(E_1 ∩ ... ∩ E_n) of the velocity ellipsoids, shape (M,).
@@ -48,16 +49,51 @@ def measure(cell: Cell, w: dict[str, np.ndarray], Jv: dict[str, np.ndarray]) -> 
     common = common_volume(np.stack(list(cores.values()), axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = {name: common / ellipsoid_volume(core) for name, core in cores.items()}
-    tight = [s.name for s in cell.stations if s.coupling.kind == "tight"]
-    loose = [s.name for s in cell.stations if s.coupling.kind == "loose"]
+    m_tight, m_loose = products(cell, w)
+    return Measures(team(cell, w, ratio), m_tight, m_loose, common, ratio)
+
+
+def products(cell: Cell, w: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return M_tight and M_loose, each of shape (M,); M_tight is NaN where no robot is tight."""
+    tight, loose = _sides(cell)
     m_loose = np.prod([w[name] for name in loose], axis=0)
-    m_tight = np.prod([w[name] for name in tight], axis=0) if tight else np.full_like(m_loose, math.nan)
+    return (np.prod([w[name] for name in tight], axis=0) if tight else np.full_like(m_loose, math.nan)), m_loose
+
+
+def team(cell: Cell, w: dict[str, np.ndarray], ratio: dict[str, np.ndarray]) -> np.ndarray:
+    """Return the value of the cell's reading, shape (M,), from manipulabilities and shares r_k by station name.
+
+    A factor that all shares of a configuration have in common cancels.
+    """
     if cell.objective.reading in OF_ALL:
-        mmr = OF_ALL[cell.objective.reading](list(w.values()), axis=0)
-    else:
-        beta = (np.mean([ratio[name] for name in tight], axis=0), np.mean([ratio[name] for name in loose], axis=0))
-        mmr = read(cell.objective.reading, beta, (m_tight, m_loose), (len(tight), len(loose)))
-    return Measures(mmr, m_tight, m_loose, common, ratio)
+        return OF_ALL[cell.objective.reading](list(w.values()), axis=0)
+    tight, loose = _sides(cell)
+    beta = (np.mean([ratio[name] for name in tight], axis=0), np.mean([ratio[name] for name in loose], axis=0))
+    return read(cell.objective.reading, beta, products(cell, w), (len(tight), len(loose)))
+
+
+def least_along(cell: Cell, w: dict[str, np.ndarray], Jv: dict[str, np.ndarray]) -> float:
+    """Return the least value of the cell's reading at M configurations, without their common volume, which cancels."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = {name: 1 / ellipsoid_volume(J @ J.swapaxes(-1, -2)) for name, J in Jv.items()}
+    return float(team(cell, w, shares).min())
+
+
+def along_seam(objective: Objective, values: np.ndarray) -> float:
+    """Return the cell's objective of the values (N,) at the seam's points, by the definition of each."""
+    if objective.over_seam == "minimum":
+        return float(values.min())
+    if objective.exponent is None:
+        return float(values.mean())
+    best = float(values.max())  # in units of which powers are taken, so that they stay within what numbers hold
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return float(best * np.mean((values / best) ** -objective.exponent) ** (-1 / objective.exponent))
+
+
+def _sides(cell: Cell) -> tuple[list[str], list[str]]:
+    """Return the names of the tight and of the loose stations."""
+    tight = [s.name for s in cell.stations if s.coupling.kind == "tight"]
+    return tight, [s.name for s in cell.stations if s.coupling.kind == "loose"]
 
 
 def read(

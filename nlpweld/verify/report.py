@@ -89,7 +89,8 @@ class Violation:
 class Report:
     """Everything the checker found out about one plan or placement.
 
-    ``*_mean``, ``mmr_min``, ``mmr_max``, ``manipulability_min`` and ``clearance_m`` are over the N points of the seam.
+    ``objective``, ``*_mean``, ``mmr_min``, ``mmr_max``, ``manipulability_min`` and ``clearance_m`` are over the N
+    points of the seam; ``mmr_min_along`` is the least along the whole of it.
     ``clearance_along_m``, ``joint_margin_rad``, ``posture_rad`` and ``singularity_min`` are over the whole seam,
     between the points too; these decide.
 
@@ -99,9 +100,13 @@ class Report:
         yaw_rad: turn of {P} about z_W [rad].
         n_points: number of points N.
         reading: the reading of Pan et al., eq. (16), that MMR has, or ``product`` or ``mean`` of all robots' w.
-        mmr_mean: the objective; its unit depends on the reading ("paper" adds m^6 to m^3).
+        over_seam: what the cell maximises over the seam: ``mean``, ``minimum`` or ``soft_minimum`` of the N points.
+        exponent: of the soft minimum (see :class:`~nlpweld.cell.levels.Objective`), else None.
+        objective: the value of that; its unit is that of MMR.
+        mmr_mean: mean of the N points; its unit depends on the reading ("paper" adds m^6 to m^3).
         mmr_min: least of the N points.
         mmr_max: greatest of the N points.
+        mmr_min_along: least along the whole seam, between the points too.
         m_tight_mean: mean product of the tight robots' w (eq. 15) [m^3 for each]; NaN where there are none.
         m_loose_mean: mean product of the loose robots' w [m^3 for each].
         manipulability_mean: by station name [m^3].
@@ -128,9 +133,13 @@ class Report:
     yaw_rad: float
     n_points: int
     reading: str
+    over_seam: str
+    exponent: float | None
+    objective: float
     mmr_mean: float
     mmr_min: float
     mmr_max: float
+    mmr_min_along: float
     m_tight_mean: float
     m_loose_mean: float
     manipulability_mean: dict[str, float]
@@ -171,7 +180,8 @@ class Report:
         each = {station.name: nan for station in cell.stations}
         return cls(
             cell=cell.name, at=(x, y, z), yaw_rad=yaw, n_points=n_points, reading=cell.objective.reading,
-            mmr_mean=nan, mmr_min=nan, mmr_max=nan, m_tight_mean=nan, m_loose_mean=nan,
+            over_seam=cell.objective.over_seam, exponent=cell.objective.exponent, objective=nan,
+            mmr_mean=nan, mmr_min=nan, mmr_max=nan, mmr_min_along=nan, m_tight_mean=nan, m_loose_mean=nan,
             manipulability_mean=each, manipulability_min=dict(each), singularity_min=dict(each),
             clearance_m=nan, clearance_along_m=nan, closest_pair=None, closest_s=None,
             joint_margin_rad=nan, joint_step_rad=nan, closure_m=nan, closure_rad=nan,
@@ -224,10 +234,23 @@ class Report:
         closure = f"{self.closure_m:.1e} m, {self.closure_rad:.1e} rad"
         return [*lines, f"  closure           {closure}; {self.samples} configurations"]
 
+    @property
+    def unit(self) -> str:
+        """Unit of the reading, in brackets, for as much as it has one: most of eq. (16) add m^6 to m^3."""
+        powers = {"product": 3 * len(self.manipulability_mean), "mean": 3}
+        if self.reading in powers:
+            return f"[m^{powers[self.reading]}]"
+        return f"[lengths in {'mm' if self.reading == 'millimetres' else 'm'}]"
+
     def _objective(self) -> list[str]:
         """Return the lines on objective and products, without those that say nothing in this cell."""
         label = f"  {WHOLE.get(self.reading, f'MMR ({self.reading})')}"
-        lines = [label.ljust(20) + f"mean {self.mmr_mean:.6g}, {self.mmr_min:.6g} to {self.mmr_max:.6g}"]
+        text = f"mean {self.mmr_mean:.6g}, {self.mmr_min:.6g} to {self.mmr_max:.6g} {self.unit}"
+        lines = textwrap.wrap(label.ljust(20) + text, WIDTH, subsequent_indent=" " * 20)
+        if self.over_seam != "mean":
+            kind = "least of the points" if self.exponent is None else f"soft minimum (p = {self.exponent:g})"
+            text = f"  maximised         {kind} {self.objective:.6g}; least along the seam {self.mmr_min_along:.6g}"
+            lines += textwrap.wrap(text, WIDTH, subsequent_indent=" " * 20)
         if not math.isnan(self.m_tight_mean):
             lines.append(f"  M_tight, M_loose  mean {self.m_tight_mean:.6g}, {self.m_loose_mean:.6g}")
         elif self.reading != "product":  # without tight robots M_loose is the product

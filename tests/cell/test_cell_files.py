@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from nlpweld.cell import load_cell
+from nlpweld.cell import Cell, load_cell
 from nlpweld.cell.files import LIBRARY
 from nlpweld.errors import CellError
 
@@ -161,3 +161,30 @@ def test_content_hash_tells_cells_apart_by_value_and_by_source() -> None:
     others = [cell.with_(seam={"points": 36}), cell.with_(seam={"source": "other"})]
     assert len({c.content_hash for c in [cell, *others]}) == 3
     assert load_cell("three_er16").content_hash == cell.content_hash
+
+
+def test_hash_of_a_cell_stays_where_the_usual_is_said_and_changes_where_another_objective_is() -> None:
+    cell = load_cell("three_er16")
+    assert "over_seam" not in cell.model_dump_json()
+    assert cell.with_(objective={"over_seam": "mean", "exponent": None}).content_hash == cell.content_hash
+    soft = [{"over_seam": "soft_minimum", "exponent": p} for p in (1.0, 8.0)]
+    others = [cell.with_(objective=fields) for fields in ({"over_seam": "minimum"}, *soft)]
+    assert len({c.content_hash for c in [cell, *others]}) == 4
+    again = Cell.model_validate_json(others[2].model_dump_json(exclude_unset=True))
+    assert (again.objective.over_seam, again.objective.exponent) == ("soft_minimum", 8.0)
+    assert again.content_hash == others[2].content_hash
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"over_seam": "soft_minimum"}, "needs an exponent"),
+        ({"over_seam": "minimum", "exponent": 8.0}, "remove it"),
+        ({"exponent": 8.0}, "remove it"),
+        ({"over_seam": "soft_minimum", "exponent": 0.0}, "greater than 0"),
+        ({"over_seam": "median"}, "soft_minimum"),
+    ],
+)
+def test_exponent_goes_with_the_soft_minimum_alone(fields: dict[str, object], told: str) -> None:
+    with pytest.raises(ValidationError, match=told):
+        load_cell("three_er16").with_(objective=fields)

@@ -77,6 +77,19 @@ def test_named_placement_points_and_reading_change_the_question(call):
     assert found["at"] == [0.023, -0.266, 0.404]
 
 
+def test_objective_over_the_seam_changes_the_question_and_leaves_the_other_fields(call):
+    asked = ["evaluate", "robot_positioner", "--at", 0.0, -1.0, 0.5, "--points", 18, "--json"]
+    plain, least, soft = (
+        json.loads(call(*asked, *more)[1])
+        for more in ([], ["--over-seam", "minimum"], ["--over-seam", "soft_minimum:8"])
+    )
+    assert (plain["over_seam"], plain["objective"]) == ("mean", plain["mmr_mean"])
+    assert (least["over_seam"], least["objective"]) == ("minimum", plain["mmr_min"])
+    assert (soft["over_seam"], soft["exponent"]) == ("soft_minimum", 8.0)
+    assert plain["mmr_min"] < soft["objective"] < plain["mmr_mean"]
+    assert least["mmr_mean"] == soft["mmr_mean"] == plain["mmr_mean"]
+
+
 def test_solve_keeps_a_plan_that_verify_accepts(call, tmp_path):
     code, out, _ = call("solve", "three_er16", "--solver", "ga", "--evaluations", 2000, "--out", tmp_path, "--json")
     found = json.loads(out)
@@ -129,6 +142,11 @@ def test_compare_tables_and_plots_from_stored_records(call, tmp_path):
         (["evaluate", "three_er16", "--placement", "nowhere"], "paper"),
         (["evaluate", "three_er16", *PAPER, "--branches", "back"], "front"),
         (["evaluate", "three_er16", *PAPER, "--reading", "median"], "harmonic"),
+        (["evaluate", "three_er16", *PAPER, "--over-seam", "median"], "soft_minimum"),
+        (["evaluate", "three_er16", *PAPER, "--over-seam", "soft_minimum"], "exponent"),
+        (["evaluate", "three_er16", *PAPER, "--over-seam", "minimum:3"], "exponent"),
+        (["evaluate", "three_er16", *PAPER, "--over-seam", "soft_minimum:much"], "much"),
+        (["evaluate", "robot_positioner", *PAPER, "--reading", "paper"], "product, mean"),
         (["evaluate", "three_er16", *PAPER, "--points", "0"], "--points"),
         (["solve", "three_er16", "--solver", "gaa"], "'ga'"),
         (["solve", "three_er16", "--formulation", "ful"], "reduced"),

@@ -25,6 +25,12 @@ def folder(tmp_path):
 
 
 @pytest.fixture
+def asked():
+    """Return a report of a run that maximises something else than the mean MMR."""
+    return lambda mmr, **objective: {**report(mmr), **objective}
+
+
+@pytest.fixture
 def add(folder):
     """Store a record in the folder and return its path."""
     return partial(store, folder)

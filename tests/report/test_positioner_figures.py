@@ -182,6 +182,9 @@ def test_objective_is_named_by_its_reading():
     assert objective_label(runs, "mean") == "mean $w$ [m$^3$]"
     assert objective_label(runs.assign(reading="paper"), "mean") == "mean MMR [lengths in m]"
     assert objective_label(runs.assign(reading="millimetres"), "best", " so far") == "best MMR so far [lengths in mm]"
+    least = runs.assign(reading="paper", over_seam="minimum")
+    assert objective_label(least, "mean") == "least MMR [lengths in m]"
+    assert objective_label(least, "best", " so far") == "best least MMR so far [lengths in m]"
 
 
 def test_a_study_without_a_reference_has_none_of_these(whole, tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 
 from nlpweld.errors import OutputError
-from nlpweld.report.markup import latex
+from nlpweld.report.markup import latex, markdown
 from nlpweld.report.records import load_baselines, load_records
 from nlpweld.report.tables import as_text, format_summary, summary, write_tables
 
@@ -25,14 +25,14 @@ def test_an_unverified_claim_enters_no_mean_and_no_best(folder, add, add_baselin
     table = rows(folder)
     ga = table.loc[("three_er16", "ga")]
     assert (ga["runs"], ga["claimed"], ga["verified"]) == (3, 3, 2)
-    assert ga["mmr_mean"] == pytest.approx(0.29)
-    assert ga["mmr_std"] == pytest.approx(np.sqrt(2) * 0.01)
-    assert ga["mmr_best"] == pytest.approx(0.30)
-    assert ga["mmr_share_percent"] == pytest.approx(100 * 0.29 / 0.30)
+    assert ga["objective_mean"] == pytest.approx(0.29)
+    assert ga["objective_std"] == pytest.approx(np.sqrt(2) * 0.01)
+    assert ga["objective_best"] == pytest.approx(0.30)
+    assert ga["share_percent"] == pytest.approx(100 * 0.29 / 0.30)
     liar = table.loc[("three_er16", "liar")]
     assert (liar["claimed"], liar["verified"]) == (1, 0)
-    assert liar[["mmr_mean", "mmr_best", "mmr_share_percent", "to_reference_mm"]].isna().all()
-    assert table.loc[("three_er16", "Pan et al. C")]["mmr_share_percent"] == pytest.approx(80.0)
+    assert liar[["objective_mean", "objective_best", "share_percent", "to_reference_mm"]].isna().all()
+    assert table.loc[("three_er16", "Pan et al. C")]["share_percent"] == pytest.approx(80.0)
 
 
 def test_failed_runs_are_counted_and_leave_the_medians_alone(folder, add):
@@ -60,7 +60,7 @@ def test_cells_are_measured_by_their_own_best(folder, add, add_baseline):
     add(cell="b", mmr=0.4)
     add_baseline(cell="b")
     table = rows(folder)
-    assert table.loc[("a", "ga")]["mmr_share_percent"] == 100.0
+    assert table.loc[("a", "ga")]["share_percent"] == 100.0
     assert np.isnan(table.loc[("a", "ga")]["to_reference_mm"])
 
 
@@ -68,8 +68,8 @@ def test_an_infeasible_baseline_is_shown_but_counts_for_nothing(folder, add, add
     add(mmr=0.29)
     add_baseline(mmr=0.9, feasible=False)
     table = rows(folder)
-    assert table.loc[("three_er16", "Pan et al. C")][["mmr_mean", "mmr_best"]].isna().all()
-    assert table.loc[("three_er16", "ga")]["mmr_share_percent"] == 100.0
+    assert table.loc[("three_er16", "Pan et al. C")][["objective_mean", "objective_best"]].isna().all()
+    assert table.loc[("three_er16", "ga")]["share_percent"] == 100.0
 
 
 def test_tables_are_written_in_every_form(folder, add, add_baseline):
@@ -78,7 +78,7 @@ def test_tables_are_written_in_every_form(folder, add, add_baseline):
     add_baseline()
     written = write_tables(folder)
     again = pd.read_csv(folder / "tables" / "summary.csv")
-    assert again["mmr_mean"].tolist() == pytest.approx(written["mmr_mean"].tolist())
+    assert again["objective_mean"].tolist() == pytest.approx(written["objective_mean"].tolist())
     assert len(pd.read_csv(folder / "tables" / "runs.csv")) == 2
     markdown = (folder / "tables" / "summary.md").read_text().splitlines()
     assert len({line.count("|") for line in markdown}) == 1
@@ -129,3 +129,30 @@ def test_tables_need_neither_solvers_nor_matplotlib():
     names = "names = {'casadi', 'pymoo', 'matplotlib', 'fcl'};"
     done = subprocess.run([sys.executable, "-c", names + code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_heading_says_what_is_maximised(folder, add, asked):
+    add(report=asked(0.4, reading="product"))
+    assert "| product of w mean ± sd |" in markdown(as_text(rows(folder).reset_index()))
+    add(report=asked(0.4, reading="paper", over_seam="minimum", objective=0.1))
+    table = rows(folder).reset_index()
+    assert "| least MMR mean ± sd |" in markdown(as_text(table))
+    assert table["objective_mean"].tolist() == [0.1]
+    add(report=asked(0.4, over_seam="soft_minimum", exponent=8.0, objective=0.2, reading="millimetres"))
+    assert "| soft least MMR (millimetres) (p = 8) mean ± sd |" in markdown(as_text(rows(folder).reset_index()))
+
+
+def test_rows_say_what_they_maximise_where_that_differs(folder, add, add_baseline, asked):
+    add(cell="a", report=asked(0.4, reading="product"))
+    add(cell="b")
+    add_baseline(cell="b")
+    lines = markdown(as_text(rows(folder).reset_index())).splitlines()
+    assert "| maximised | mean ± sd |" in lines[0]
+    assert [line.count("| MMR |") + 2 * line.count("| product of w |") for line in lines[2:]] == [2, 1, 1]
+
+
+def test_older_records_maximise_the_mean(folder, add):
+    add(mmr=0.29)
+    runs = load_records(folder)
+    assert (runs["objective"] == 0.29).all()
+    assert (runs["over_seam"] == "mean").all()

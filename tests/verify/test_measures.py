@@ -109,3 +109,21 @@ def test_cell_without_handlers_has_no_tight_product(dual, rng):
     assert np.isnan(got.m_tight).all()
     np.testing.assert_allclose(got.m_loose, w["robot_1"] * w["robot_2"])
     np.testing.assert_array_equal(got.mmr, got.m_loose)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e-200, 1e200])
+def test_objective_along_the_seam_by_its_definition(cell, factor):
+    values = factor * np.array([0.2, 0.3, 0.25, 0.8])
+    least, soft = {"over_seam": "minimum"}, {"over_seam": "soft_minimum", "exponent": 2.0}
+    asked = {name: cell_with(cell, objective=fields).objective for name, fields in (("min", least), ("soft", soft))}
+    assert measures.along_seam(cell.objective, values) == pytest.approx(0.3875 * factor)
+    assert measures.along_seam(asked["min"], values) == 0.2 * factor
+    by_hand_ = ((1 / 0.04 + 1 / 0.09 + 1 / 0.0625 + 1 / 0.64) / 4) ** -0.5
+    assert measures.along_seam(asked["soft"], values) == pytest.approx(by_hand_ * factor)
+    assert measures.along_seam(asked["soft"], np.array([0.0, 0.3])) == 0.0
+
+
+@pytest.mark.parametrize("reading", ["paper", *READINGS, *OF_ALL])
+def test_least_along_a_motion_needs_no_common_volume(cell, inputs, reading):
+    other = cell_with(cell, objective={"reading": reading})
+    assert measures.least_along(other, *inputs) == pytest.approx(measures.measure(other, *inputs).mmr.min(), rel=1e-12)

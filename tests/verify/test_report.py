@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ import pytest
 from nlpweld.plan import Plan
 from nlpweld.verify.check import verify
 from nlpweld.verify.report import SHOWN, Report, Violation, unreachable, worst_first
+
+from .helpers import cell_with
 
 
 def violation(value: float, robot: str = "handler_1", joint: str | None = "J4") -> Violation:
@@ -131,3 +134,24 @@ def test_placement_with_yaw_but_without_a_plan(dual):
     assert report.violations[0].s == 1.0  # the last point of an open seam is its end
     assert math.isnan(report.posture_rad)
     assert json.loads(json.dumps(report.to_json(), allow_nan=False))["posture_rad"] is None
+
+
+def test_text_says_what_is_maximised_and_in_which_unit(cell, report: Report):
+    assert "mean 0.284151, 0.153509 to 0.353748 [lengths in m]" in str(report)
+    assert "maximised" not in str(report)
+    soft = with_fields(report, over_seam="soft_minimum", exponent=8.0, objective=0.194779)
+    text = " ".join(str(soft).split())  # the line is folded
+    assert "maximised soft minimum (p = 8) 0.194779; least along the seam 0.15345" in text
+    least = with_fields(report, over_seam="minimum", objective=0.153509, reading="millimetres")
+    assert "maximised         least of the points 0.153509; least along the seam 0.15345" in str(least)
+    assert "[lengths in mm]" in str(least)
+    assert max(len(line) for r in (soft, least) for line in str(r).splitlines()) <= 79
+
+
+def test_objective_is_what_the_plan_s_cell_asks_for(coarse: Plan):
+    cells = [cell_with(coarse.cell, objective={"over_seam": over}) for over in ("mean", "minimum")]
+    mean, least = (verify(replace(coarse, cell=c)) for c in cells)
+    assert mean.objective == mean.mmr_mean == least.mmr_mean
+    assert least.objective == least.mmr_min == mean.profile["mmr"].min()
+    assert least.mmr_min_along < least.mmr_min  # between the points it is less
+    assert least.to_json()["over_seam"] == "minimum"

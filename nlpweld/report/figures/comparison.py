@@ -49,12 +49,12 @@ def mmr_by_solver(study: Study, cell: str) -> Figure:
     axes = fig.add_subplot()
     labels = sorted(runs["label"].unique())
     for i, label in enumerate(labels):
-        _strip(axes, i, runs[runs["label"] == label], "mmr_mean", style.SERIES[i % len(style.SERIES)])
+        _strip(axes, i, runs[runs["label"] == label], "objective", style.SERIES[i % len(style.SERIES)])
     _reference(axes, study.baselines, cell)
     axes.margins(y=0.1)
     _solver_axis(axes, runs, labels)
     style.name_axes(axes, "solver (verified of runs)", objective_label(runs, "mean"), cell)
-    _legend_of_marks(axes, bool((~runs["verified"] & runs["mmr_mean"].notna()).any()))
+    _legend_of_marks(axes, bool((~runs["verified"] & runs["objective"].notna()).any()))
     return fig
 
 
@@ -128,7 +128,10 @@ def objective_label(runs: pd.DataFrame, before: str, after: str = "") -> str:
 
     Eq. (16) of Pan et al. adds m^6 to m^3, so the unit of length is all there is to say of it.
     """
-    readings = set(runs["reading"].dropna())
+    readings, over = set(runs["reading"].dropna()), set(runs.get("over_seam", ["mean"]))
+    if over != {"mean"}:
+        least = "soft least" if over == {"soft_minimum"} else "least"
+        before = least if before == "mean" else f"{before} {least}"
     if readings == {"product"}:
         robots = sum(name.startswith("manipulability_mean_") for name in runs.dropna(axis="columns", how="all").columns)
         factors = " ".join(f"w_{i}" for i in range(1, robots + 1)) if robots > 1 else "w"
@@ -162,10 +165,10 @@ def _reference(axes: Axes, baselines: pd.DataFrame, cell: str) -> None:
     own = baselines[(baselines["cell"] == cell) & baselines["feasible"].astype(bool)]
     for _, row in own.iterrows():
         label = row["name"] if len(own) == 1 else None
-        axes.axhline(row["mmr_mean"], color=style.INK, linestyle=":", linewidth=1.0, label=label)
+        axes.axhline(row["objective"], color=style.INK, linestyle=":", linewidth=1.0, label=label)
         if label is None:
             look = {"ha": "right", "va": "bottom", "fontsize": 6.5}
-            at = {"xy": (1.0, row["mmr_mean"]), "xycoords": ("axes fraction", "data")}
+            at = {"xy": (1.0, row["objective"]), "xycoords": ("axes fraction", "data")}
             axes.annotate(row["name"], xytext=(-2, 0), textcoords="offset points", **at, **look)
 
 
