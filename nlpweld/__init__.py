@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from nlpweld.formulation.full_redundant import full_redundant
     from nlpweld.formulation.reduced import reduced
     from nlpweld.formulation.redundant import redundant
+    from nlpweld.formulation.robust import robust
     from nlpweld.plan import Plan, load_plan
     from nlpweld.solvers import Budget, solver_names
-    from nlpweld.verify import Report
+    from nlpweld.verify import Report, verify_robust
     from nlpweld.verify import verify as verify_plan
 
 __version__ = "0.1.0"
@@ -42,9 +43,11 @@ _HOMES = {
     "load_robot": "cell",
     "reduced": "formulation.reduced",
     "redundant": "formulation.redundant",
+    "robust": "formulation.robust",
     "solve": "bench.answer",
     "solver_names": "solvers",
     "verify_plan": "verify",
+    "verify_robust": "verify",
 }
 
 __all__ = [
@@ -66,9 +69,11 @@ __all__ = [
     "load_robot",
     "reduced",
     "redundant",
+    "robust",
     "solve",
     "solver_names",
     "verify_plan",
+    "verify_robust",
 ]
 
 

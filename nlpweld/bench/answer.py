@@ -16,14 +16,16 @@ from nlpweld.formulation.full_redundant import FULL_REDUNDANT, full_redundant
 from nlpweld.formulation.nlp import Nlp
 from nlpweld.formulation.reduced import OutOfReach, reduced
 from nlpweld.formulation.redundant import REDUNDANT, redundant
+from nlpweld.formulation.robust import ROBUST, robust
 from nlpweld.plan import Plan
 from nlpweld.solvers import Budget, Outcome, Solver, make_solver
-from nlpweld.verify import Report, verify
+from nlpweld.verify import Report, verify, verify_robust
 from nlpweld.verify.report import unreachable
 
 FORMULATIONS: dict[str, Callable[[Cell, str], Nlp]] = {
     "reduced": reduced,
     "full": full,
+    ROBUST: robust,
     **{name: partial(redundant, level=level) for level, name in REDUNDANT.items()},
     **{name: partial(full_redundant, level=level) for level, name in FULL_REDUNDANT.items()},
 }
@@ -118,14 +120,17 @@ def coordinates(cell: Cell, at: tuple[float, ...] | np.ndarray) -> np.ndarray:
 
 
 def evaluate_plan(nlp: Nlp, x: np.ndarray, mode: int | None = None) -> tuple[Plan | None, Report]:
-    """Return plan and report of a point of a problem; without a mode, of the best mode there."""
+    """Return plan and report of a point of a problem; without a mode, of the best mode there.
+
+    An answer of the robust form is verified in every scenario.
+    """
     assert nlp.unpack is not None
     plan = nlp.unpack(x, int(nlp.evaluate(x[None]).mode[0]) if mode is None else mode)
     if isinstance(plan, OutOfReach):
         cell = plan.cell
         at = cell.placement(x[: len(cell.variables)])
         return None, unreachable(cell, at, plan.station, plan.point, cell.seam.points)
-    return plan, verify(plan)
+    return plan, verify_robust(plan) if nlp.formulation == ROBUST else verify(plan)
 
 
 def solve(

@@ -14,6 +14,7 @@ from nlpweld.cell.robot import Body
 from nlpweld.cell.seams import Composite, Polyline
 from nlpweld.cell.station import Station
 from nlpweld.cell.task import Capsule, Positioner, Posture, Saddle, Tee, Workpiece
+from nlpweld.cell.uncertainty import Uncertainty
 from nlpweld.errors import OptionError
 
 VARIABLES = ("x_m", "y_m", "z_m", "yaw_rad")
@@ -36,6 +37,7 @@ class Cell(Checked):
     constraints: Constraints
     objective: Objective
     freedom: Freedom | None = None
+    uncertainty: Uncertainty | None = None
     placements: Annotated[dict[str, Vector], Field(default_factory=dict)]
 
     @model_validator(mode="after")
@@ -130,20 +132,22 @@ class Cell(Checked):
         """Return a copy with some fields of some tables replaced, checked like a file.
 
         Args:
-            tables: table name to fields, e.g. ``with_(seam={"points": 36})``.
+            tables: table name to fields, e.g. ``with_(seam={"points": 36})``; a table the cell lacks is added.
 
         Raises:
             pydantic.ValidationError: a replaced field is not valid.
         """
         data = self.model_dump(mode="python", exclude_unset=True)
         for table, fields in tables.items():
-            data[table] = {**data[table], **fields}
+            data[table] = {**(data.get(table) or {}), **fields}
         return Cell.model_validate(data)
 
     @property
     def content_hash(self) -> str:
         """SHA-256 of everything the cell states, sources included, as hexadecimal digits."""
         held: Any = {"stations": {k: {"layout"} for k, s in enumerate(self.stations) if s.layout is None}}
+        if self.uncertainty is None:  # like layouts, younger than hashes in stored records
+            held["uncertainty"] = True
         return hashlib.sha256(self.model_dump_json(exclude=held).encode()).hexdigest()
 
     @property

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from nlpweld.cli import ask, look, study
+from nlpweld.cli import ask, judge, look, study
 from nlpweld.errors import OptionError
 
 app = typer.Typer(
@@ -28,6 +28,9 @@ OverSeam = Annotated[
 ]
 Points = Annotated[int | None, typer.Option(help="seam points; the cell's own by default")]
 Formulation = Annotated[str, typer.Option(metavar="NAME", help="how the problem is written down")]
+Robust = Annotated[
+    bool, typer.Option("--robust", help="also under the errors of placement and bases that the cell states")
+]
 TimeLimit = Annotated[float | None, typer.Option(min=0.0, help="time limit of a run [s]")]
 Evaluations = Annotated[int | None, typer.Option(min=1, help="limit on candidates of the exact model")]
 
@@ -58,11 +61,13 @@ def evaluate(
     reading: Reading = None,
     over_seam: OverSeam = None,
     points: Points = None,
+    robust: Robust = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="keep the plan of this placement")] = None,
     json: Json = False,
 ) -> int:
     """Verify one placement along the whole seam."""
-    return ask.evaluate(ask.variant(cell, branches, ask.Goal(reading, over_seam), points), at, placement, out, json)
+    chosen = ask.variant(cell, branches, ask.Goal(reading, over_seam), points)
+    return ask.evaluate(chosen, at, placement, out, json, robust)
 
 
 @app.command()
@@ -86,9 +91,16 @@ def solve(
 
 
 @app.command()
-def verify(plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a plan file")], json: Json = False) -> int:
+def verify(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a plan file")],
+    robust: Robust = False,
+    samples: Annotated[
+        int | None, typer.Option(min=0, help="with --robust: scenarios drawn at random besides the vertices")
+    ] = None,
+    json: Json = False,
+) -> int:
     """Check a plan along the whole seam, apart from whatever made it."""
-    return ask.verify(plan, json)
+    return judge.verify(plan, json, robust, samples)
 
 
 @app.command()

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from nlpweld.cell import OVER_SEAM, READINGS, Cell, load_cell
 from nlpweld.errors import OptionError, OutputError
-from nlpweld.plan import Plan, load_plan
+from nlpweld.plan import Plan
 
 if TYPE_CHECKING:
     from nlpweld.bench.task import Task
@@ -133,21 +133,28 @@ def tasks_of(path: Path) -> "list[Task]":
 
 
 def evaluate(
-    cell: Cell, at: tuple[float, float, float] | None, placement: str | None, out: Path | None, json: bool
+    cell: Cell,
+    at: tuple[float, float, float] | None,
+    placement: str | None,
+    out: Path | None,
+    json: bool,
+    robust: bool = False,
 ) -> int:
     """Print the report of one placement; 0 when feasible, 1 when not.
 
     Raises:
-        OptionError: a robot cannot reach the seam there, so there is nothing to measure.
+        OptionError: a robot cannot reach the seam there, so there is nothing to measure, or the cell states no errors
+            to be robust against.
     """
-    from nlpweld.bench.answer import coordinates, evaluate_plan
-    from nlpweld.formulation.reduced import reduced
+    from nlpweld.bench.answer import coordinates, evaluate_plan, formulate
 
     where = _where(cell, at, placement)
     x = coordinates(cell, where)
     if out is not None:
         writable(out.parent)
-    plan, report = evaluate_plan(reduced(cell, engine="numpy"), x)
+    nlp = formulate(cell, "robust" if robust else "reduced", engine="numpy")
+    with busy(f"evaluating {cell.name}", quiet=json):
+        plan, report = evaluate_plan(nlp, x)
     if plan is not None and out is not None:
         plan.save(out)
     if json:
@@ -176,7 +183,7 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
     _tell_drift(asked.cell)
     name, _, preset = asked.solver.partition(":")
     nlp = formulate(asked.cell, asked.formulation)
-    with _busy(f"{asked.solver} on {asked.cell.name}, seed {asked.seed}", quiet=json) as tell:
+    with busy(f"{asked.solver} on {asked.cell.name}, seed {asked.seed}", quiet=json) as tell:
 
         def counted(X: np.ndarray, inner: Any = nlp.evaluate) -> Any:
             tell(len(X))
@@ -218,17 +225,6 @@ def solve(asked: Question, out: Path | None, json: bool) -> int:
         else:
             print(f"plan: {plan_path}" if plan_path else "add --out DIR to keep the plan")
     return 0 if answer.verified else 1
-
-
-def verify(path: Path, json: bool) -> int:
-    """Print the report of a plan file; 0 when feasible, 1 when not."""
-    from nlpweld.verify.check import verify as verify_
-
-    plan = load_plan(path)
-    with _busy("verifying", quiet=json):
-        report = verify_(plan)
-    print(json_.dumps(report.to_json()) if json else report)
-    return 0 if report.feasible else 1
 
 
 def writable(folder: Path) -> None:
@@ -278,7 +274,7 @@ def _start(plan: Plan | None) -> dict[str, Any]:
 
 
 @contextmanager
-def _busy(what: str, quiet: bool) -> Iterator[Any]:
+def busy(what: str, quiet: bool) -> Iterator[Any]:
     """Show on standard error that work is going on, with the count of candidates told."""
     console, count = Console(stderr=True, quiet=quiet), 0
     with console.status(what) as status:

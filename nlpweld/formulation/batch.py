@@ -8,11 +8,13 @@ from typing import Protocol
 import numpy as np
 
 from nlpweld.cell.cell import Cell
+from nlpweld.cell.uncertainty import as_stated
 from nlpweld.engine.choice import chosen_engine
 from nlpweld.formulation.branches import SAMPLES, Screening
 from nlpweld.formulation.coupling import point_data
 from nlpweld.formulation.nlp import Evaluation, sobol
 from nlpweld.formulation.paths import allowed
+from nlpweld.formulation.set_up import with_errors
 from nlpweld.formulation.stage import Stage
 from nlpweld.formulation.staged import Staged
 from nlpweld.geometry.seam import seam_parameters
@@ -24,8 +26,8 @@ CONSTRAINTS = ("reach", "joint_limit", "singularity", "clearance")
 class Evaluator(Protocol):
     """Judges placements."""
 
-    def at(self, points: np.ndarray) -> "Evaluator":
-        """Return the same over other data of the seam points."""
+    def at(self, points: np.ndarray, only: int = -1) -> "Evaluator":
+        """Return the same over other data of the seam points, on one mode alone where that is not negative."""
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
         """Return objective, violations and best mode of placements X, shape (m, d)."""
@@ -42,15 +44,17 @@ class Batch:
     Attributes:
         cell: the cell.
         engine: ``numpy``, ``numba`` (the ``fast`` extra), ``c``, or ``auto`` for the fastest that is installed.
+        errors: whether the graphs take errors of the set-up (:mod:`~.set_up`), which are zero here.
     """
 
     cell: Cell
     engine: str = "auto"
+    errors: bool = False
 
     @cached_property
     def stage(self) -> Stage:
         """The graphs behind the arrays."""
-        return Stage(self.cell)
+        return Stage(self.cell, errors=self.errors)
 
     @cached_property
     def modes(self) -> list[tuple[tuple[str, str], ...]]:
@@ -66,7 +70,8 @@ class Batch:
     @cached_property
     def points(self) -> np.ndarray:
         """The data of every seam point, shape (k, N)."""
-        return point_data(self.cell, seam_parameters(self.cell))
+        points = point_data(self.cell, seam_parameters(self.cell))
+        return with_errors(points, as_stated(self.cell)) if self.errors else points
 
     @property
     def chosen_engine(self) -> str:

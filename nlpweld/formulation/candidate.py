@@ -204,7 +204,7 @@ def placed_work(facts, scratch, x):
 
 def placed_limbs(facts, scratch, x, k, b):
     """Go on from joints and base to velocity ellipsoid and bodies."""
-    limbs(k, x, scratch.cos_sin, scratch.gram[k, b], scratch.ends[k, b])
+    limbs(k, x, scratch.cos_sin, facts.points, scratch.gram[k, b], scratch.ends[k, b])
     middles(scratch.ends[k, b], scratch.middles[k, b], facts.counts[k])
 
 
@@ -290,12 +290,14 @@ def judge(X, facts, scratch, objective, violation, mode):
         work_missed = sides(facts, scratch, X[i])
         scratch.known[:] = nan
         best = inf
-        for m in range(branches ** choice.shape[0]):
+        modes = branches ** choice.shape[0]
+        first = max(0, facts.only)
+        for m in range(first, modes if facts.only < 0 else first + 1):
             rest = m
             for k in range(choice.shape[0] - 1, -1, -1):
                 choice[k] = rest % branches
                 rest //= branches
             total, found = missed_by(facts, scratch, choice, work_missed), seam_value(scratch, choice)
-            if m == 0 or total < best or (total == best and found > objective[i]):
+            if m == first or total < best or (total == best and found > objective[i]):
                 best, objective[i], mode[i] = total, found, m
                 violation[i] = scratch.total

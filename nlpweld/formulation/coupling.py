@@ -15,6 +15,7 @@ from nlpweld.cell.station import Station
 from nlpweld.cell.task import Grasp, Torch, TorchAngles
 from nlpweld.formulation.freedom import TILTS, turn, turned_work
 from nlpweld.formulation.holder import held, posture_frames
+from nlpweld.formulation.set_up import SetUp, set_up
 from nlpweld.formulation.tilting import TiltedTable, table_data, tilted_table
 from nlpweld.geometry.seam import weld_frames
 from nlpweld.geometry.torch_angles import torch_pose
@@ -40,6 +41,7 @@ class WeldPoint:
         data: what is known of the point, shape (k, 1), in the order of :func:`point_data`.
         free: its free angles, shape (f, 1) [rad].
         table: the positioner, where it tilts the weld by free angles.
+        set_up: by how much {P} and bases are off, or None where they are as stated.
     """
 
     T_P_C: Frame
@@ -49,6 +51,7 @@ class WeldPoint:
     data: ca.SX
     free: ca.SX
     table: TiltedTable | None = None
+    set_up: SetUp | None = None
 
     @property
     def vector(self) -> ca.SX:
@@ -56,8 +59,8 @@ class WeldPoint:
         return ca.vertcat(self.data, self.free)
 
 
-def weld_point(cell: Cell, free: Names = ()) -> WeldPoint:
-    """Return fresh symbols for a seam point at which some angles are free."""
+def weld_point(cell: Cell, free: Names = (), errors: bool = False) -> WeldPoint:
+    """Return fresh symbols for a seam point at which some angles are free, perhaps in a cell whose set-up is off."""
     u = ca.SX.sym("free", len(free))
     angles = dict(zip(free, ca.vertsplit(u), strict=True)) if free else {}
     table = tilted_table(cell.positioner, *(angles[t] for t in TILTS)) if cell.positioner and tilts(free) else None
@@ -68,9 +71,10 @@ def weld_point(cell: Cell, free: Names = ()) -> WeldPoint:
         targets.append(target)
         blocks += symbols
     ends_P = _table_ends(cell, table.links) if table else ca.SX.sym("ends_P", 3, 2 * len(moving_bodies(cell)))
-    data = ca.vertcat(*[ca.vec(block) for block in (blocks if table else [*blocks, ends_P])])
+    off, symbols = set_up(len(cell.stations)) if errors else (None, [])
+    data = ca.vertcat(*[ca.vec(block) for block in [*blocks, *([] if table else [ends_P]), *symbols]])
     spins = tuple(None if s.coupling.kind == "tight" else angles.get(f"spin.{s.name}") for s in cell.stations)
-    return WeldPoint(T_P_C, tuple(targets), spins, ends_P, data, u, table)
+    return WeldPoint(T_P_C, tuple(targets), spins, ends_P, data, u, table, off)
 
 
 def _work(cell: Cell, angles: dict[str, ca.SX]) -> tuple[Frame, list[ca.SX]]:

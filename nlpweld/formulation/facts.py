@@ -10,6 +10,7 @@ class Facts(NamedTuple):
 
     Attributes:
         points: data of the seam points, flat, (d * N,).
+        only: the one mode to look at; all if negative.
         signs: shoulder, elbow and wrist of every arm branch, (B, 3).
         joints: lower and upper limits and DH offsets of every station, (S, 3, n) [rad].
         wrists: whether the wrists noflip and flip are allowed, (2,).
@@ -24,6 +25,7 @@ class Facts(NamedTuple):
     """
 
     points: np.ndarray
+    only: int
     signs: np.ndarray
     joints: np.ndarray
     wrists: np.ndarray

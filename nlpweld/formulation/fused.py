@@ -83,12 +83,17 @@ class Fused:
     points: np.ndarray
     arm_branches: list[tuple[str, str]]
 
-    def at(self, points: np.ndarray) -> "Fused":
-        """Return the same over other data of as many seam points, shape (d, N); what is built is kept."""
+    def at(self, points: np.ndarray, only: int = -1) -> "Fused":
+        """Return the same over other data of as many seam points, shape (d, N); what is built is kept.
+
+        Args:
+            points: the data.
+            only: the mode, or negative for all.
+        """
         facts, _, _ = self._facts, self._judge, self._scratch  # built before the copy, which shares them
         other = copy(self)
         object.__setattr__(other, "points", points)
-        vars(other)["_facts"] = facts._replace(points=points.ravel())
+        vars(other)["_facts"] = facts._replace(points=points.ravel(), only=only)
         return other
 
     def evaluate(self, X: np.ndarray) -> Evaluation:
@@ -114,6 +119,7 @@ class Fused:
         floors = [(k, i, s.radius_m) for k, own in enumerate(shapes) for i, s in enumerate(own) if s.above_floor]
         return Facts(
             points=self.points.ravel(),
+            only=-1,
             signs=np.array([[SHOULDER[s], ELBOW[e], 1.0] for s, e in self.arm_branches]),
             joints=np.array([[*robot.limits_rad.T, robot.dh[:, 3]] for robot in robots]),
             wrists=np.array([name in allowed(cell.configuration.wrist, WRIST) for name in ("noflip", "flip")]),
@@ -154,7 +160,7 @@ def source(stage: Stage, n: int) -> str:
     """Return the source text of the module that judges a cell's candidates at n seam points."""
     kernels: dict[str, tuple[ca.Function, Kinds]]
     kernels = {f"grip_{k}": (f, ("candidate", "point", "number")) for k, f in enumerate(stage.grips)}
-    kernels |= {f"limbs_{k}": (f, ("candidate", "lane")) for k, f in enumerate(stage.limbs)}
+    kernels |= {f"limbs_{k}": (f, ("candidate", "lane", "point")[: f.n_in()]) for k, f in enumerate(stage.limbs)}
     kernels["work"] = stage.work, ("candidate", "point")
     kernels["gap"] = stage.gap, ("lane", "lane", "number")
     kernels["value"] = value_graph(stage.cell), ("lane", "lane")
@@ -164,18 +170,18 @@ def source(stage: Stage, n: int) -> str:
     parts += [INNER + kernel_source(f, kinds, n, name) for name, (f, kinds) in kernels.items()]
     stations = range(len(stage.grips))
     parts.append(_switch("grip", "x, points, signs, cos_sin, w, reach", stations))
-    parts.append(_switch("limbs", "x, cos_sin, gram, ends", stations))
+    parts.append(_switch("limbs", "x, cos_sin, points, gram, ends", stations, "" if stage.errors else "points, "))
     chosen = OVER_SEAM[objective.over_seam]
     parts += [(JIT if f is candidate.judge else INNER) + inspect.getsource(f) for f in (*chosen, *STEPS)]
     parts.append(f"over_seam = {chosen[-1].__name__}\n")
     return "\n\n".join(parts)
 
 
-def _switch(name: str, arguments: str, stations: range) -> str:
-    """Return the source of a function that calls station k's kernel for one candidate."""
+def _switch(name: str, arguments: str, stations: range, dropped: str = "") -> str:
+    """Return the source of a function that calls station k's kernel for one candidate, less an argument perhaps."""
     lines = [f"def {name}(k, {arguments}):"]
     for k in stations:
-        lines += [f"    if k == {k}:", f"        {name}_{k}(1, {arguments})"]
+        lines += [f"    if k == {k}:", f"        {name}_{k}(1, {arguments.replace(dropped, '')})"]
     return INNER + "\n".join(lines) + "\n"
 
 

@@ -84,10 +84,10 @@ class Relaxer:
         What is left out is a guess from a sample; the exact model, which leaves nothing out, judges the answer.
         """
         batch = self.batch
-        gaps = None if whole else self._near(mode)
+        gaps = None if whole else self.near(mode)
         return relaxation(batch.stage, batch.modes[mode], gaps, batch.chosen_engine)
 
-    def _near(self, mode: int) -> Gaps | None:
+    def near(self, mode: int) -> Gaps | None:
         """Return the distances that matter where the mode keeps all else, or nearly so; None if that is too seldom."""
         X = self.batch.screening.at(mode)
         if len(X) < self.enough:

@@ -117,6 +117,19 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
     That is its penalties and, where the objective is the mean over the seam, its share of it. The free angles of the
     point, if the stage has any, follow the placement's coordinates in x.
     """
+    inputs, loss, penalty = _terms(stage, mode, gaps, n)
+    term = loss + penalty if stage.cell.objective.over_seam == "mean" else penalty
+    return ca.Function("term", inputs, [term], {"cse": True})
+
+
+def loss_and_penalty(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> tuple[ca.Function, ca.Function]:
+    """Return the two parts of :func:`term_function`: what the objective brings, and what is missed, softly."""
+    inputs, loss, penalty = _terms(stage, mode, gaps, n)
+    return ca.Function("loss", inputs, [loss], {"cse": True}), ca.Function("penalty", inputs, [penalty], {"cse": True})
+
+
+def _terms(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> tuple[list[ca.SX], ca.SX, ca.SX]:
+    """Return inputs (x, point, sharpness), loss and penalty of one of n seam points."""
     cell, sharpness = stage.cell, ca.SX.sym("sharpness")
     z, data, x, point = _variables(stage)
     arms = [arm(x, point, _branch(b)) for arm, b in zip(stage.arms, mode, strict=True)]
@@ -125,10 +138,7 @@ def term_function(stage: Stage, mode: Mode, gaps: Gaps, n: int) -> ca.Function:
         constraints.append(stage.table(point)[1])
     ends = [*(arm[4] for arm in arms), stage.work(x, point)]
     constraints.append((chosen_gaps(stage, gaps, ends) - cell.constraints.clearance_at_points_m) / GAP_SCALE_M)
-    term = softened(constraints, sharpness)
-    if cell.objective.over_seam == "mean":
-        term = -_value(cell, arms) / n + term
-    return ca.Function("term", [z, data, sharpness], [term], {"cse": True})
+    return [z, data, sharpness], -_value(cell, arms) / n, softened(constraints, sharpness)
 
 
 def step_function(stage: Stage, mode: Mode, bound: float) -> ca.Function:

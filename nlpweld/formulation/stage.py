@@ -19,8 +19,16 @@ from nlpweld.cell.cell import Cell
 from nlpweld.cell.robot import Body
 from nlpweld.cell.station import Station
 from nlpweld.errors import KinematicsError
-from nlpweld.formulation.coupling import base_frame, flange_pose, moving_bodies, placement_frame, weld_point
+from nlpweld.formulation.coupling import (
+    WeldPoint,
+    base_frame,
+    flange_pose,
+    moving_bodies,
+    placement_frame,
+    weld_point,
+)
 from nlpweld.formulation.holder import held
+from nlpweld.formulation.set_up import moved
 from nlpweld.geometry.capsules import segment_distance
 from nlpweld.geometry.seam import seam_parameters
 from nlpweld.kinematics.chain import Chain, Frame, constant, jacobian_of, rpy_pose
@@ -52,10 +60,12 @@ class Stage:
     Attributes:
         cell: the cell.
         free: names of the angles that are free at every seam point; see :mod:`~.freedom`.
+        errors: whether {P} and bases may be off; a seam point's data ends as :mod:`~.set_up` says.
     """
 
     cell: Cell
     free: tuple[str, ...] = ()
+    errors: bool = False
 
     @cached_property
     def grips(self) -> tuple[ca.Function, ...]:
@@ -64,7 +74,7 @@ class Stage:
 
     @cached_property
     def limbs(self) -> tuple[ca.Function, ...]:
-        """One function per station: ``(x, cos_sin) -> gram, ends``."""
+        """One function per station: ``(x, cos_sin) -> gram, ends``, or ``(x, cos_sin, point)`` where errors are."""
         return tuple(self._limbs(k) for k in range(len(self.cell.stations)))
 
     @cached_property
@@ -75,8 +85,8 @@ class Stage:
     @cached_property
     def work(self) -> ca.Function:
         """``(x, point) -> ends`` of the workpiece's bodies, then of the positioner's."""
-        x, point = self._x, weld_point(self.cell, self.free)
-        T_W_P = placement_frame(self.cell, x)
+        x, point = self._x, self._point
+        T_W_P = self._placed(x, point)
         T_W_C = T_W_P @ point.T_P_C
         ends = [T_W_C.point(p) for body in self.cell.workpiece.bodies for p in (body.start_m, body.end_m)]
         ends += [T_W_P.point(p) for p in self._positioner_ends(point.ends_P)]
@@ -109,6 +119,20 @@ class Stage:
     @property
     def _x(self) -> ca.SX:
         return ca.SX.sym("x", len(self.cell.variables))
+
+    @property
+    def _point(self) -> WeldPoint:
+        return weld_point(self.cell, self.free, self.errors)
+
+    def _placed(self, x: ca.SX, point: WeldPoint) -> Frame:
+        """Return T_W_P of a placement, off as the point says."""
+        T_W_P = placement_frame(self.cell, x)
+        return T_W_P if point.set_up is None else moved(T_W_P, point.set_up.placement)
+
+    def _base(self, k: int, x: ca.SX, point: WeldPoint) -> Frame:
+        """Return T_W_B of station k, off as the point says."""
+        T_W_B = base_frame(self.cell, k, x)
+        return T_W_B if point.set_up is None else moved(T_W_B, point.set_up.bases[k])
 
     @cached_property
     def shapes(self) -> tuple[tuple[Shape, ...], ...]:
@@ -171,8 +195,8 @@ class Stage:
 
     def _grip(self, k: int) -> ca.Function:
         station, x = self.cell.stations[k], self._x
-        point, branch = weld_point(self.cell, self.free), ca.SX.sym("branch", 3)
-        T_W_C, T_W_B = placement_frame(self.cell, x) @ point.T_P_C, base_frame(self.cell, k, x)
+        point, branch = self._point, ca.SX.sym("branch", 3)
+        T_W_C, T_W_B = self._placed(x, point) @ point.T_P_C, self._base(k, x, point)
         T_B_F = flange_pose(station, T_W_C, point.targets[k], point.spins[k], T_W_B)
         found = self._inverse(station).solve(T_B_F, branch)
         outputs = [ca.horzcat(found.cos, found.sin), self._inverse(station).abs_det_jacobian(found), found.reach]
@@ -181,17 +205,20 @@ class Stage:
 
     def _limbs(self, k: int) -> ca.Function:
         station, x = self.cell.stations[k], self._x
-        cos_sin, base = ca.SX.sym("cos_sin", len(station.robot.joints), 2), base_frame(self.cell, k, x)
+        cos_sin, point = ca.SX.sym("cos_sin", len(station.robot.joints), 2), self._point
+        base = self._base(k, x, point)
         links = Chain(station.robot).links(cos_sin[:, 0], cos_sin[:, 1])  # in {B}: the ellipsoid is the same anywhere
         tcp = links[-1] @ constant(rpy_pose(station.tool.translation_m, station.tool.rpy_deg))
         ends = ca.horzcat(*[base.point(end) for body in station.bodies for end in body_ends(body, links, tcp)])
         outputs = [det_gram(jacobian_of(links, tcp.p)[0]), ends]
-        return _function(f"limbs_{station.name}", [x, cos_sin], outputs, ["x", "cos_sin"], ["gram", "ends"])
+        inputs, names = [x, cos_sin, point.vector], ["x", "cos_sin", "point"]
+        n = 2 + self.errors
+        return _function(f"limbs_{station.name}", inputs[:n], outputs, names[:n], ["gram", "ends"])
 
     def _arm(self, k: int) -> ca.Function:
-        x, point, branch = self._x, weld_point(self.cell, self.free).vector, ca.SX.sym("branch", 3)
+        x, point, branch = self._x, self._point.vector, ca.SX.sym("branch", 3)
         cos_sin, w, reach = self.grips[k](x, point, branch)
-        gram, ends = self.limbs[k](x, cos_sin)
+        gram, ends = self.limbs[k](*[x, cos_sin, point][: 2 + self.errors])
         name, names = f"arm_{self.cell.stations[k].name}", ["cos_sin", "w", "gram", "reach", "ends"]
         return _function(name, [x, point, branch], [cos_sin, w, gram, reach, ends], ["x", "point", "branch"], names)
 

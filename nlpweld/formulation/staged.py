@@ -55,12 +55,14 @@ class Staged:
         stage: its graphs.
         points: the data of every seam point, shape (d, N).
         arm_branches: the (shoulder, elbow) pairs the cell allows.
+        only: the one mode to look at; all if negative.
     """
 
     cell: Cell
     stage: Stage
     points: np.ndarray
     arm_branches: list[tuple[str, str]]
+    only: int = -1
 
     @cached_property
     def _joint_limits(self) -> list[Limits]:
@@ -72,7 +74,7 @@ class Staged:
 
     @cached_property
     def _limbs(self) -> list[Kernel]:
-        return [numpy_kernel(limbs, ("candidate", "lane")) for limbs in self.stage.limbs]
+        return [numpy_kernel(limbs, ("candidate", "lane", "point")[: limbs.n_in()]) for limbs in self.stage.limbs]
 
     @cached_property
     def _work(self) -> Kernel:
@@ -91,11 +93,17 @@ class Staged:
     def _chunk(self) -> int:
         return self._candidates(CHUNK)
 
-    def at(self, points: np.ndarray) -> "Staged":
-        """Return the same over other data of the seam points, shape (d, N); what is built is kept."""
+    def at(self, points: np.ndarray, only: int = -1) -> "Staged":
+        """Return the same over other data of the seam points, shape (d, N); what is built is kept.
+
+        Args:
+            points: the data.
+            only: the mode, or negative for all.
+        """
         _ = self._grips, self._limbs, self._work, self._meetings, self._joint_limits  # built before they are shared
         other = copy(self)
         object.__setattr__(other, "points", points)
+        object.__setattr__(other, "only", only)
         return other
 
     def keeps(self, X: np.ndarray) -> np.ndarray:
@@ -126,6 +134,8 @@ class Staged:
         best = Evaluation(np.full(len(X), -np.inf), np.full((len(X), 4), np.inf), np.zeros(len(X), dtype=int))
         met: dict[tuple[int, int, int, int], np.ndarray] = {}
         for mode, choice in enumerate(product(range(len(self.arm_branches)), repeat=len(sides))):
+            if self.only not in (-1, mode):
+                continue
             chosen = [side[b] for side, b in zip(sides, choice, strict=True)]
             missed = np.max([side.missed for side in chosen], axis=0)
             missed[:, 3] = np.maximum(missed[:, 3], work)
@@ -141,7 +151,8 @@ class Staged:
         if not len(near):
             nothing = np.empty((0, self.points.shape[1]))
             return Side(missed, slot, nothing, nothing, [], np.empty((2, 0, 3, 0)))
-        parts = [self._limbs[k](X[near[c]], rows(cos_sin, c)) for c in _slices(len(near), self._chunk)]
+        given = [self.points][: self.stage.errors]
+        parts = [self._limbs[k](X[near[c]], rows(cos_sin, c), *given) for c in _slices(len(near), self._chunk)]
         gram, ends = joined([part[0] for part in parts])[0], joined([part[1] for part in parts])
         side = Side(missed, slot, w, gram, ends, boxes(ends, self.stage.shapes[k]))
         missed[near, 3] = self._missed_gap(self._lowest_alone(k, X[near], side))

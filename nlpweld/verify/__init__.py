@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nlpweld.verify.check import verify
     from nlpweld.verify.report import Report, Violation
+    from nlpweld.verify.robust import verify_robust
 
-__all__ = ["Report", "Violation", "verify"]
+__all__ = ["Report", "Violation", "verify", "verify_robust"]
 
 
 def __getattr__(name: str) -> Any:
@@ -17,6 +18,10 @@ def __getattr__(name: str) -> Any:
         from nlpweld.verify.check import verify
 
         return verify
+    if name == "verify_robust":
+        from nlpweld.verify.robust import verify_robust
+
+        return verify_robust
     if name in ("Report", "Violation"):
         from nlpweld.verify import report
 

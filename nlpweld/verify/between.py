@@ -120,7 +120,7 @@ class _Samples:
     def insert(self, after: np.ndarray, s: np.ndarray, share: np.ndarray) -> None:
         """Put new samples after some, in order, each found from the configuration a share of the way to the next."""
         start = {name: (1 - x) * q[after] + x * q[after + 1] for name, q in self.q.items() for x in [share[:, None]]}
-        q, bad = _closed(self.cell, self.placement, s, start, self.free)
+        q, bad = closed_near(self.cell, self.placement, s, start, self.free)
         good = ~np.isin(s, [u.s for u in bad])
         self.unclosed += bad
         self.torn[after[~good]] = True
@@ -187,10 +187,18 @@ def _newton_step(J: np.ndarray, e: np.ndarray) -> np.ndarray:
     return step * np.minimum(1.0, LONGEST_STEP_RAD / np.maximum(size, 1e-300))
 
 
-def _closed(
+def closed_near(
     cell: Cell, placement: np.ndarray, s: np.ndarray, start: dict[str, np.ndarray], free: Offsets | None
 ) -> tuple[dict[str, np.ndarray], list[Unclosed]]:
-    """Return configurations near others: the positioner's, then the robots' that follow it; and what stays open."""
+    """Return configurations near others: the positioner's, then the robots' that follow it; and what stays open.
+
+    Args:
+        cell: the cell.
+        placement: of {P} in W, shape (3,) or (4,) [m; rad].
+        s: seam parameter, shape (M,).
+        start: joint angles to start from by name of station or positioner, each of shape (M, n) [rad].
+        free: offsets of free angles, if any.
+    """
     found, bad, table = {}, [], None
     if cell.positioner is not None:
         name = cell.positioner.name

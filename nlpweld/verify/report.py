@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from nlpweld.cell import Cell
+from nlpweld.verify.worst_case import WorstCase
 
 # An excess of this size [in the constraint's own unit] counts as equally bad; constraints not named come first.
 SCALE = {
@@ -126,6 +127,7 @@ class Report:
         feasible: no violation.
         violations: worst first, one for each constraint, robot or pair, and joint.
         profile: arrays over the N points, by name; those of a robot as ``name.station``.
+        worst_case: the same under errors of the set-up, where they were asked for; they then count for ``feasible``.
     """
 
     cell: str
@@ -158,6 +160,7 @@ class Report:
     feasible: bool
     violations: tuple[Violation, ...]
     profile: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
+    worst_case: WorstCase | None = None
 
     @classmethod
     def without_plan(
@@ -197,13 +200,14 @@ class Report:
         """
         shallow = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "profile"}
         shallow["violations"] = [asdict(v) for v in self.violations]
+        shallow["worst_case"] = self.worst_case and asdict(self.worst_case)
         if profile:
             shallow["profile"] = {name: array.tolist() for name, array in self.profile.items()}
         return {name: _plain(value) for name, value in shallow.items()}
 
     def __str__(self) -> str:
         """Return a small table, at most 80 columns wide."""
-        lines = [*self._headline(), *self._numbers()]
+        lines = [*self._headline(), *self._numbers(), *(self.worst_case.lines() if self.worst_case else ())]
         for violation in self.violations[:SHOWN]:
             lines += textwrap.wrap(str(violation), WIDTH, initial_indent="  - ", subsequent_indent="      ")
         more = len(self.violations) - SHOWN
