@@ -14,7 +14,7 @@ from nlpweld.errors import OptionError
 from nlpweld.solvers.base import Budget, Outcome, Solver
 
 __path__ += filter(None, os.environ.get("NLPWELD_SOLVERS", "").split(os.pathsep))
-HELPERS = {"base", "population", "starts", "worker"}
+HELPERS = {"base", "homotopy", "nlpsol", "population", "scalar", "slopes", "starts", "worker"}
 
 __all__ = ["Budget", "Outcome", "Solver", "make_solver", "presets", "solver_names"]
 

@@ -10,7 +10,7 @@ from pymoo.operators.mutation.pm import PM
 
 from nlpweld.formulation.nlp import Nlp
 from nlpweld.solvers.base import Budget, Incumbent, Outcome
-from nlpweld.solvers.population import Stop, evolve, population_unsuitable
+from nlpweld.solvers.population import Stop, evolve, first_population, population_unsuitable
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,11 @@ class Ga:
     still: int = 5
     eliminate: bool = False
 
-    PRESETS: ClassVar[dict[str, dict[str, object]]] = {"default": {}, "paper": {"eliminate": True}}
+    PRESETS: ClassVar[dict[str, dict[str, object]]] = {
+        "default": {},
+        "paper": {"eliminate": True},
+        "tuned": {"crossover": 0.9, "crossover_eta": 5.0},
+    }
 
     def unsuitable(self, nlp: Nlp) -> str | None:
         """Return why this solver cannot take the problem, or None when it can."""
@@ -53,6 +57,7 @@ class Ga:
             pop_size=self.population,
             crossover=SBX(prob=self.crossover, eta=self.crossover_eta),
             mutation=PM(eta=self.mutation_eta),
+            **({"sampling": first_population(nlp, seed, self.population)} if nlp.sample else {}),
         )
         build_s = time.perf_counter() - search.started
         stop = Stop(self.generations, self.mean_change, self.still)

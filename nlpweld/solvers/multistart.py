@@ -40,7 +40,7 @@ class Multistart:
     workers: int = 0
     least: int = 500
 
-    PRESETS: ClassVar[dict[str, dict[str, object]]] = {"default": {}}
+    PRESETS: ClassVar[dict[str, dict[str, object]]] = {"default": {}, "tuned": {"inner_preset": "tuned"}}
 
     def unsuitable(self, nlp: Nlp) -> str | None:
         """Return why this solver cannot take the problem, or None when it can."""

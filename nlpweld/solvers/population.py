@@ -50,7 +50,7 @@ def evolve(algorithm: Algorithm, search: Incumbent, seed: int, budget: Budget, s
     algorithm.setup(problem, seed=seed, verbose=False, termination=("n_gen", stop.generations))
     mean, still = float("nan"), 0
     for _ in range(stop.generations):
-        if search.spent(budget):
+        if search.x is not None and search.spent(budget):  # whoever sets out late still brings one answer
             return search.spent(budget)
         brood = algorithm.ask()
         if budget.evaluations is not None and search.evaluations + len(brood) > budget.evaluations:
@@ -79,6 +79,16 @@ def _generation(search: Incumbent, X: np.ndarray, F: np.ndarray, algorithm: Algo
     mean = float(-F[feasible].mean()) if feasible.any() else float("nan")
     search.note(mean=mean, spread=float(pdist(X).mean()))
     return mean
+
+
+def first_population(nlp: Nlp, seed: int, count: int) -> np.ndarray:
+    """Return individuals to begin with, (count, n): uniform, or where a problem knows good starts, its own.
+
+    Uniform draws of the many variables of a path would jump from point to point and all be infeasible.
+    """
+    if nlp.sample:
+        return nlp.starts(seed, count)
+    return np.random.default_rng(seed).uniform(nlp.lower, nlp.upper, (count, len(nlp.lower)))
 
 
 def population_unsuitable(nlp: Nlp) -> str | None:

@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from nlpweld.formulation.branches import Screening
-from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
+from nlpweld.formulation.nlp import Equalities, Evaluation, Nlp, Relaxation, sobol
 
 PEAK = np.array([0.3, -0.2])
 
@@ -134,3 +135,38 @@ def strips(closed: tuple[int, ...], met: tuple[int, ...], followed: list[int] | 
     box = np.ones(2)
     screen = partial(Screening, np.zeros((4, 2)), kept)
     return Nlp("strips", "toy", ("x", "y"), -box, box, ("open",), evaluate, relax=relax, n_modes=4, screen=screen)
+
+
+def lying(nlp: Nlp, relaxed: Nlp) -> Nlp:
+    """A problem whose relaxation is another's: what its derivatives promise, its exact model does not keep."""
+    return replace(nlp, relax=relaxed.relax)
+
+
+def stepped(radius: float = 0.4, step: float = 0.25) -> Nlp:
+    """The disc with violations in coarse steps, so that many candidates tie."""
+    exact = disc(radius)
+
+    def evaluate(X: np.ndarray) -> Evaluation:
+        found = exact.evaluate(X)
+        return Evaluation(found.objective, np.ceil(found.violation / step) * step, found.mode)
+
+    return replace(exact, evaluate=evaluate)
+
+
+def on_parabola() -> Nlp:
+    """The disc, wide enough not to matter, on the curve y = x^2."""
+    free = disc(2.0)
+
+    def relax(mode: int, whole: bool) -> Relaxation:
+        relaxed = free.relax(mode, whole)
+        x, p, lam_f, lam_g = ca.MX.sym("x", 2), ca.MX.sym("p"), ca.MX.sym("lam_f"), ca.MX.sym("lam_g", 1)
+        g = x[1] - x[0] ** 2
+        upper = ca.triu(lam_f * relaxed.hessian(x, p) + lam_g * ca.hessian(g, x)[0])
+        equalities = Equalities(
+            ca.Function("g", [x], [g]),
+            ca.Function("j", [x], [ca.jacobian(g, x)]),
+            ca.Function("h", [x, p, lam_f, lam_g], [upper]),
+        )
+        return replace(relaxed, equalities=equalities)
+
+    return replace(free, relax=relax)
