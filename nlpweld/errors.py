@@ -27,3 +27,7 @@ class OutputError(NlpweldError):
 
 class VerifierError(NlpweldError):
     """The geometry process behind ``verify`` hung or died, twice; nothing can be said about the plan."""
+
+
+class ReferenceFileError(NlpweldError):
+    """A reference file cannot be used, or does not hold for the cell or answer it is held against."""

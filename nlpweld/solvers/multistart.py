@@ -1,4 +1,7 @@
-"""Many starts of a local solver, each from its own scrambled Sobol sequence, spread over processes."""
+"""Many starts of a local solver, each from its own scrambled Sobol sequence, spread over processes.
+
+Multi-start is as old as local search; Rinnooy Kan and Timmer (1987) say when to stop.
+"""
 
 from collections.abc import Generator, Sequence
 from contextlib import closing
