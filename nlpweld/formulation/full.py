@@ -5,7 +5,7 @@ The problem is large but sparse, for seam points share nothing but the placement
 
 Variables are the placement's coordinates [m; rad], then seam point after seam point the joints of all stations in
 their order [rad], in DH direction, and the point's free angles, if any (:mod:`~.full_redundant`). A positioner is the
-master: its joints follow from the seam alone and are none.
+master: its joints follow from the seam alone and are none, but where free angles tilt the weld by them.
 Where the objective over the seam is not the mean, a level of MMR that all points share comes after the placement; it
 serves the descent alone.
 
@@ -14,7 +14,7 @@ inherits from its start. Changing one means to pass |det J| = 0, and the penalty
 before that. It is a penalty at the seam's points, not a wall, so the exact model counts points on a wrong side.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -22,6 +22,7 @@ import casadi as ca
 import numpy as np
 
 from nlpweld.cell.cell import Cell
+from nlpweld.cell.robot import Robot
 from nlpweld.errors import OptionError
 from nlpweld.formulation.arrow import Arrow, Steps, arrow_relaxation
 from nlpweld.formulation.batch import Batch
@@ -31,7 +32,7 @@ from nlpweld.formulation.margins import with_margins
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.over_seam import over_seam
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, limit_margins, on_wrist, settle
-from nlpweld.formulation.seam_point import JOINTS, LEVER_M, SeamPoint, closure_function, facts_function, full_term
+from nlpweld.formulation.seam_point import LEVER_M, SeamPoint, closure_function, facts_function, full_term, moved
 from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps
 from nlpweld.formulation.stage import GAP_SCALE_M, Stage
 from nlpweld.geometry.seam import seam_parameters
@@ -81,10 +82,10 @@ def full_start(plan: Plan, level: str | None = None) -> np.ndarray:
         if name not in names and np.any(offsets):
             raise OptionError(f"the plan turns {name}, which the form does not free; take a level that does")
     angles = [freedom.get(name, np.zeros(len(plan.s)))[:, None] for name in names]
-    joints = np.hstack([plan.paths[station.name] for station in plan.cell.stations])
+    robots, every = (np.hstack([plan.paths[n] for n in moved(plan.cell, free)]) for free in ((), tuple(names)))
     x, plain = plan.cell.coordinates(plan.placement), Full(Batch(plan.cell, "numpy"))
-    shared = plain.with_level(x, joints.ravel())[: plain.arrow.shared]
-    return np.concatenate([shared, np.hstack([joints, *angles]).ravel()])
+    shared = plain.with_level(x, robots.ravel())[: plain.arrow.shared]
+    return np.concatenate([shared, np.hstack([every, *angles]).ravel()])
 
 
 @dataclass(frozen=True)
@@ -145,16 +146,26 @@ class Full:
     @property
     def bounds(self) -> np.ndarray:
         """Bounds of all variables, shape (2, n): the placement's box, joint limits less the solvers' margin, bands."""
-        need = np.radians(self.cell.constraints.joint_margin_deg) + HAIR
-        limits = np.hstack([s.robot.limits_rad.T for s in self.cell.stations]) + np.array([[need], [-need]])
         bands = np.array([[a.lower, a.upper] for a in self.angles]).reshape(-1, 2).T
         level = np.tile(LEVELS, (self.point.levels, 1)).T
-        return np.hstack([self.cell.box, level, np.tile(np.hstack([limits, bands]), self.arrow.points)])
+        own = np.dstack([self.limits + np.reshape([HAIR, -HAIR], (2, 1, 1)), self._at_all_points(bands)])
+        return np.hstack([self.cell.box, level, own.reshape(2, -1)])
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Joint limits less the solvers' margin at every seam point, shape (2, N, joints) [rad]."""
+        need = np.radians(self.cell.constraints.joint_margin_deg)
+        limits = np.hstack([s.robot.limits_rad.T for s in self.cell.stations])
+        return self._at_all_points(limits + np.array([[need], [-need]]))
+
+    def _at_all_points(self, pair: np.ndarray) -> np.ndarray:
+        return np.repeat(pair[:, None], self.arrow.points, axis=1)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all variables."""
-        own = [f"{s.name}.J{i + 1}" for s in self.cell.stations for i in range(JOINTS)] + [a.name for a in self.angles]
+        joints = [f"{name}.J{i + 1}" for name, robot in self.point.moved.items() for i in range(len(robot.joints))]
+        own = joints + [angle.name for angle in self.angles]
         shared = (*self.cell.variables, *["level"] * self.point.levels)
         return (*shared, *(f"{name}[{j}]_rad" for j in range(self.arrow.points) for name in own))
 
@@ -184,16 +195,23 @@ class Full:
         self.evaluate(self.bounds.mean(axis=0)[None])
 
     def joints(self, Z: np.ndarray) -> np.ndarray:
-        """Return joint paths of candidates Z (m, n), shape (m, S, 6, N) [rad]."""
+        """Return joint paths of candidates Z (m, n), shape (m, joints, N) [rad]."""
         own = Z[:, self.arrow.shared :].reshape(len(Z), self.arrow.points, self.arrow.own)
-        return own[..., : self.point.joints].reshape(*own.shape[:2], -1, JOINTS).transpose(0, 2, 3, 1)
+        return own[..., : self.point.joints].transpose(0, 2, 1)
+
+    def _each(self, q: np.ndarray) -> Iterator[tuple[str, Robot, np.ndarray]]:
+        """Yield name, robot and joints of whatever has some, from the paths of all joints (m, joints, M)."""
+        first = 0
+        for name, robot in self.point.moved.items():
+            yield name, robot, q[:, first : first + len(robot.joints)]
+            first += len(robot.joints)
 
     def evaluate(self, Z: np.ndarray) -> Evaluation:
         """Return objective, violations and mode of candidates Z, shape (m, n)."""
         Z = np.atleast_2d(np.asarray(Z, dtype=float))
         offset, turn, factors, w, mmr, gap = self._judged(Z)
         levels, q = self.cell.constraints, self.joints(Z)
-        open_by = np.maximum(offset / LEVER_M, turn).max(axis=(1, 2))
+        open_by = np.dstack([offset / LEVER_M, turn]).max(axis=(1, 2))
         floor, margin = levels.floor_at_points_m3, np.radians(levels.joint_margin_deg)
         step, limit = self._path(q)
         missed = self._missed_steps(step) | {
@@ -219,7 +237,7 @@ class Full:
         return [np.array(fact).T.reshape(m, n, -1) for fact in found]
 
     def _settled(self, q: np.ndarray) -> np.ndarray:
-        """Return joint paths (m, S, 6, N), shifted by whole turns if they must, closed ones with their way back [rad].
+        """Return joint paths (m, joints, N) [rad], shifted by whole turns if they must, a closed one's way back added.
 
         A joint that winds once about a closed seam ends a turn away from where it began, which no bound of a variable
         says. What is the same but for whole turns is one answer, so exact model and plan choose the turn alike.
@@ -228,13 +246,13 @@ class Full:
             back = q[..., -1:] + (q[..., :1] - q[..., -1:] + np.pi) % (2 * np.pi) - np.pi
             q = np.concatenate([q, back], axis=-1)
         need = np.radians(self.cell.constraints.joint_margin_deg)
-        return np.stack([settle(s.robot, q[:, k], need) for k, s in enumerate(self.cell.stations)], axis=1)
+        return np.hstack([settle(robot, own, need) for _, robot, own in self._each(q)])
 
     def _path(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return longest step and least margin to a limit of joint paths, (m,) [rad], the way back included."""
         settled = self._settled(q)
-        margins = [limit_margins(s.robot, settled[:, k]).min(axis=1) for k, s in enumerate(self.cell.stations)]
-        return np.abs(np.diff(settled, axis=-1)).max(axis=(1, 2, 3)), np.min(margins, axis=0)
+        margins = [limit_margins(robot, own).min(axis=1) for _, robot, own in self._each(settled)]
+        return np.abs(np.diff(settled, axis=-1)).max(axis=(1, 2)), np.min(margins, axis=0)
 
     def _astray(self, factors: np.ndarray) -> np.ndarray:
         """Return the share of points with a robot on another side than at the first, or one not allowed, (m,)."""
@@ -267,11 +285,11 @@ class Full:
         cell, z = self.cell, np.asarray(z, dtype=float)
         x = z[: len(cell.variables)]
         s, placement = seam_parameters(cell), cell.placement(x)
-        q = self._settled(self.joints(z[None]))[0, ..., : self.arrow.points]
-        paths = {station.name: q[k].T for k, station in enumerate(cell.stations)}
+        q = self._settled(self.joints(z[None]))[..., : self.arrow.points]
+        paths = {name: own[0].T for name, _, own in self._each(q)}
         turned = held(cell, s).q
         if cell.positioner and turned is not None:
-            paths[cell.positioner.name] = turned
+            paths.setdefault(cell.positioner.name, turned)
         found = self._branches(self._judged(z[None])[2])[0]
         branches = {st.name: (b[0], b[1], b[2]) for st, b in zip(cell.stations, found, strict=True)}
         return Plan(cell.laid_out(x), placement[:3], s, paths, branches, float(placement[3]))
@@ -289,8 +307,11 @@ class Full:
         """Return variables (n,) of a placement (d,), with joints on a mode's branches and angles (f, N) or nominal."""
         u = np.zeros((len(self.angles), self.arrow.points)) if angles is None else angles
         points = np.vstack([self.data, u])
-        paths = [self._inverse(k, x, points, branch) for k, branch in enumerate(self.batch.modes[mode])]
-        return self.with_level(x, np.vstack([*paths, u]).T.ravel())
+        return self.with_level(x, np.vstack([self._inverses(x, mode, points), u]).T.ravel())
+
+    def _inverses(self, x: np.ndarray, mode: int, points: np.ndarray) -> np.ndarray:
+        """Return joint paths (joints, N) [rad] at a placement (d,) on a mode's branches, for data with free angles."""
+        return np.vstack([self._inverse(k, x, points, branch) for k, branch in enumerate(self.batch.modes[mode])])
 
     def with_level(self, x: np.ndarray, own: np.ndarray) -> np.ndarray:
         """Return variables (n,) of a placement (d,) and the points' own (N * own,), with their level if any."""
@@ -314,7 +335,7 @@ class Full:
         n, robot, closed = self.arrow.points, self.cell.stations[k].robot, self.cell.seam.closed
         side = np.reshape(signs((*branch, "noflip")), (3, 1))
         out = self.stage.grips[k].map(n)(np.tile(x[:, None], n), points, np.tile(side, n))[0]
-        lanes = np.array(out).reshape(JOINTS, n, 2).transpose(2, 0, 1).reshape(2 * JOINTS, 1, n)
+        lanes = np.array(out).reshape(-1, n, 2).transpose(2, 0, 1).reshape(-1, 1, n)
         wrists, need = allowed(self.cell.configuration.wrist, WRIST), np.radians(self.cell.constraints.joint_margin_deg)
         wrist = wrists[best_wrist(Limits.of(robot, closed), lanes, wrists, need)[1][0]]
         return settle(robot, on_wrist(robot, joint_paths(robot, lanes, closed), wrist), np.inf)[0, :, :n]

@@ -3,6 +3,9 @@
 Besides the closure of every chain, which couples a point's joints with its free angles, joint steps from one seam
 point to the next are bounded, the way back of a closed seam included. Paths of angles need no splines to be smooth:
 what joints do not jump, angles do not either. Bands are bounds of variables.
+
+Where a positioner tilts the weld, its joints are variables too, beside the robots', bounded by their limits and by the
+same steps. Closure ties them to slope and rotation.
 """
 
 from dataclasses import dataclass
@@ -13,7 +16,6 @@ import casadi as ca
 import numpy as np
 
 from nlpweld.cell.cell import Cell
-from nlpweld.errors import OptionError
 from nlpweld.formulation.arrow import Steps
 from nlpweld.formulation.batch import Batch
 from nlpweld.formulation.freedom import FreeAngle
@@ -23,6 +25,7 @@ from nlpweld.formulation.nlp import Nlp
 from nlpweld.formulation.redundant import STEP_MARGIN_DEG, Redundant
 from nlpweld.formulation.smooth import Gaps, step_penalty
 from nlpweld.formulation.stage import Stage
+from nlpweld.formulation.tilting import table_limits
 from nlpweld.plan import Plan
 
 FULL_REDUNDANT = {"spin": "full_spin", "spin_yaw": "full_spin_yaw", "spin_yaw_tilt": "full_redundant"}
@@ -43,9 +46,6 @@ def full_redundant(cell: Cell, engine: str = "auto", level: str = "spin_yaw_tilt
     """
     batch = Batch(cell, engine)
     form = FullRedundant(batch, Redundant(batch, level))
-    if form.stage.table:
-        name = cell.positioner.name if cell.positioner else ""
-        raise OptionError(f"{cell.name}: in full space {name} cannot tilt the weld; take the formulation 'redundant'")
     again = partial(full_redundant, cell, engine, level)
     return form.nlp(
         FULL_REDUNDANT[level], lambda extra: full_redundant(with_margins(cell, extra), engine, level), again
@@ -76,6 +76,14 @@ class FullRedundant(Full):
     def angles(self) -> tuple[FreeAngle, ...]:
         """What is free at every seam point besides the joints."""
         return self.splines.coding.angles
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Joint limits less the solvers' margin at every seam point, shape (2, N, joints) [rad]."""
+        positioner, q = self.cell.positioner, self.splines.untilted
+        if not self.stage.table or positioner is None or q is None:
+            return super().limits
+        return np.dstack([super().limits, table_limits(self.cell, positioner, q)])
 
     @property
     def constraints(self) -> tuple[str, ...]:
@@ -119,6 +127,10 @@ class FullRedundant(Full):
         ranked = np.lexsort((-found.objective, found.total))[: max(count, LOOKED_AT)]
         begun = [self._begun(Z[i], int(found.mode[i]), look=k < LOOKED_AT) for k, i in enumerate(ranked)]
         return np.array([z for _, z in sorted(begun, key=lambda start: -start[0])[:count]])
+
+    def _inverses(self, x: np.ndarray, mode: int, points: np.ndarray) -> np.ndarray:
+        robots, table = super()._inverses(x, mode, points), self.splines.table_path(points)
+        return robots if table is None else np.vstack([robots, table.T])
 
     def _begun(self, z: np.ndarray, mode: int, look: bool) -> tuple[float, np.ndarray]:
         """Return what the best paths on a grid at a scout's placement are worth, and the variables (n,) of a start."""

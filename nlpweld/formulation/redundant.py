@@ -132,7 +132,7 @@ class Redundant:
         return Screening(Z, np.concatenate(kept))
 
     @cached_property
-    def _untilted(self) -> np.ndarray | None:
+    def untilted(self) -> np.ndarray | None:
         """The positioner's joints while nothing is tilted, shape (N, n) [rad]."""
         return held(self.cell, seam_parameters(self.cell)).q
 
@@ -176,12 +176,17 @@ class Redundant:
 
     def _missed_by_table(self, points: np.ndarray) -> float:
         """Return by how many half turns a positioner that tilts the weld misses its joint limits, the way back too."""
-        if self.cell.positioner is None or self._table is None or self._untilted is None:
+        q, need = self.table_path(points), np.radians(self.cell.constraints.joint_margin_deg)
+        if self.cell.positioner is None or q is None:
             return 0.0
-        robot, need = self.cell.positioner.robot, np.radians(self.cell.constraints.joint_margin_deg)
-        q = tilted_path(robot, np.array(self._table(points)[0]), self._untilted)
         whole = np.vstack([q, way_back(q)]) if self.cell.seam.closed else q
-        return max(0.0, float(need - limit_margins(robot, whole.T).min())) / np.pi
+        return max(0.0, float(need - limit_margins(self.cell.positioner.robot, whole.T).min())) / np.pi
+
+    def table_path(self, points: np.ndarray) -> np.ndarray | None:
+        """Return the joints (N, n) [rad] of a positioner that tilts the weld; None of any other."""
+        if self.cell.positioner is None or self._table is None or self.untilted is None:
+            return None
+        return tilted_path(self.cell.positioner.robot, np.array(self._table(points)[0]), self.untilted)
 
     def _longest_step(self, x: np.ndarray, points: np.ndarray, mode: int) -> float:
         """Return the farthest any joint turns from one seam point to the next, the way back included [rad]."""

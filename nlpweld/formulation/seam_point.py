@@ -1,12 +1,22 @@
-"""One seam point in the full space: placement, every joint and any free angles are given, and nothing is inverted."""
+"""One seam point in the full space: placement, every joint and any free angles are given, and no robot is inverted."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 
+from nlpweld.cell.cell import Cell
 from nlpweld.cell.levels import Objective
-from nlpweld.formulation.coupling import WeldPoint, base_frame, placement_frame, tcp_pose, weld_point
+from nlpweld.cell.robot import Robot
+from nlpweld.formulation.coupling import (
+    Names,
+    WeldPoint,
+    base_frame,
+    placement_frame,
+    tcp_pose,
+    tilts,
+    weld_point,
+)
 from nlpweld.formulation.over_seam import LEAST
 from nlpweld.formulation.smooth import Gaps, chosen_gaps, softened
 from nlpweld.formulation.stage import GAP_SCALE_M, Stage
@@ -16,12 +26,19 @@ from nlpweld.kinematics.manipulability import magnitude, mmr
 
 LEVEL_WEIGHT = 2.0  # of a point's value below the level: twice the greatest multiplier there can be
 LEVER_M = 1.0  # a position error this long counts as much as a turn of one radian: about the arms' own length
-JOINTS = 6  # of every station: what has a closed-form manipulability
+
+
+def moved(cell: Cell, free: Names = ()) -> dict[str, Robot]:
+    """Return by name whose joints are variables: every station's robot, then a positioner that tilts the weld."""
+    tilting = cell.positioner if tilts(free) else None
+    return {s.name: s.robot for s in cell.stations} | ({tilting.name: tilting.robot} if tilting else {})
 
 
 @dataclass(frozen=True)
 class SeamPoint:
-    """Expressions of one seam point in its variables y: placement, then all stations' joints, then free angles.
+    """Expressions of one seam point in its variables y: placement, then all joints, then free angles.
+
+    Joints are those of all stations and, where it tilts the weld by free angles, those of the positioner.
 
     Between them comes a level of MMR, where the objective over the seam is another than the mean (:func:`full_term`).
 
@@ -31,10 +48,15 @@ class SeamPoint:
 
     stage: Stage
 
+    @cached_property
+    def moved(self) -> dict[str, Robot]:
+        """What has joints here, by name."""
+        return moved(self.stage.cell, self.stage.free)
+
     @property
     def joints(self) -> int:
-        """Number of joints of all stations."""
-        return JOINTS * len(self.stage.cell.stations)
+        """Number of joints."""
+        return sum(len(robot.joints) for robot in self.moved.values())
 
     @property
     def own(self) -> int:
@@ -56,8 +78,8 @@ class SeamPoint:
         return ca.SX.sym("x", len(self.stage.cell.variables))
 
     @cached_property
-    def _q(self) -> ca.SX:
-        return ca.SX.sym("q", self.joints)
+    def _q(self) -> list[ca.SX]:
+        return [ca.SX.sym(f"q_{name}", len(robot.joints)) for name, robot in self.moved.items()]
 
     @cached_property
     def level(self) -> ca.SX:
@@ -67,13 +89,13 @@ class SeamPoint:
     @property
     def inputs(self) -> list[ca.SX]:
         """What every graph here takes: variables y (d + levels + own, 1) [m; rad], and what is known of the point."""
-        return [ca.vertcat(self._x, self.level, self._q, self.weld.free), self.weld.data]
+        return [ca.vertcat(self._x, self.level, *self._q, self.weld.free), self.weld.data]
 
     @cached_property
     def cos_sin(self) -> list[tuple[ca.SX, ca.SX]]:
         """Cosines and sines of every station's DH angles, shapes (6, 1)."""
-        joints = ca.vertsplit(self._q, JOINTS)
-        return [Chain(s.robot).cos_sin(q) for s, q in zip(self.stage.cell.stations, joints, strict=True)]
+        stations = self.stage.cell.stations
+        return [Chain(s.robot).cos_sin(q) for s, q in zip(stations, self._q[: len(stations)], strict=True)]
 
     @cached_property
     def errors(self) -> list[tuple[ca.SX, ca.SX]]:
@@ -90,6 +112,18 @@ class SeamPoint:
             asked: Frame = tcp_pose(station.coupling, T_W_C, target, spin)
             found.append((is_.p - asked.p, asked.R.T @ is_.R))
         return found
+
+    @cached_property
+    def off_table(self) -> tuple[ca.SX, ca.SX]:
+        """Sines and cosines of how far the positioner's joints are from where slope and rotation ask for them, (n, 1).
+
+        There are none where it does not tilt the weld.
+        """
+        table, positioner = self.weld.table, self.stage.cell.positioner
+        if table is None or positioner is None:
+            return ca.SX(0, 1), ca.SX(0, 1)
+        cos, sin = Chain(positioner.robot).cos_sin(self._q[-1])
+        return sin * table.cos - cos * table.sin, cos * table.cos + sin * table.sin
 
     @cached_property
     def factors(self) -> list[ca.SX]:
@@ -126,14 +160,15 @@ class SeamPoint:
 
 
 def closure_function(point: SeamPoint) -> ca.Function:
-    """Return ``(y, point) ->`` six closure errors of every station, one below the other, all zero when it closes.
+    """Return ``(y, point) ->`` closure errors, one below the other: six of every station, all zero when it closes.
 
     Three are the position error over :data:`LEVER_M`. Three are the axis of the remaining turn times the sine of its
     angle, half of what R_d^T R differs from its transpose by: a polynomial in cosines and sines of the joints, regular
-    for turns below 90 degrees, but zero also at 180 degrees, which only the exact model tells apart.
+    for turns below 90 degrees, but zero also at 180 degrees, which only the exact model tells apart. So is the sine of
+    how far each joint of a positioner that tilts the weld is off, which comes last.
     """
     rows = [ca.vertcat(offset / LEVER_M, sine_axis(turn)) for offset, turn in point.errors]
-    return ca.Function("closure", point.inputs, [ca.densify(ca.vertcat(*rows))], {"cse": True})
+    return ca.Function("closure", point.inputs, [ca.densify(ca.vertcat(*rows, point.off_table[0]))], {"cse": True})
 
 
 def sine_axis(R: ca.SX) -> ca.SX:
@@ -173,13 +208,15 @@ def _below(objective: Objective, value: ca.SX, level: ca.SX, sharpness: ca.SX, n
 
 
 def facts_function(point: SeamPoint, gaps: Gaps) -> ca.Function:
-    """Return ``(y, point) -> offset (S), turn (S), factors (3, S), w (S), mmr, gap`` as the exact model judges them.
+    """Return ``(y, point) -> offset (S), turn (S + t), factors (3, S), w (S), mmr, gap`` as the exact model judges.
 
-    That is distance [m] and angle [rad] by which each of S chains is open, the factors and value of its
-    manipulability, the team's, and the least distance [m].
+    That is distance [m] and angle [rad] by which each of S chains is open, and the angle by which each of t joints of
+    a positioner that tilts the weld is off; the factors and value of each chain's manipulability, the team's, and the
+    least distance [m].
     """
     offset = [ca.norm_2(p) for p, _ in point.errors]
     turn = [ca.atan2(ca.norm_2(sine_axis(R)), (ca.trace(R) - 1) / 2) for _, R in point.errors]
+    turn.append(ca.fabs(ca.atan2(*point.off_table)))
     outputs = [ca.vertcat(*offset), ca.vertcat(*turn), ca.horzcat(*point.factors), ca.vertcat(*point.w), point.mmr]
     outputs.append(ca.mmin(point.gaps(gaps)))
     return ca.Function("facts", point.inputs, [ca.densify(out) for out in outputs], {"cse": True})

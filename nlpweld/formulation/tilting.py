@@ -87,21 +87,30 @@ _SYMBOLS = (("R_T_p", 3, 3), ("branch", 1, 1), ("highest", 2, 1), ("lowest", 2, 
 def table_data(cell: Cell, positioner: Positioner, s: np.ndarray) -> list[np.ndarray]:
     """Return the numbers behind :attr:`TiltedTable.symbols` at seam parameters (N,), each of shape (N, k).
 
-    The highest and lowest DH angles are the limits less the solvers' margin, but no farther than a right angle from
-    the untilted path: sines tell the side of what is that near, however often a joint may turn.
+    The highest and lowest DH angles are those of :func:`table_limits`.
     """
     work = held(cell, s)
     assert work.q is not None
     assert work.branch is not None
-    offset, need = positioner.robot.dh[:, 3], np.radians(cell.constraints.joint_margin_deg)
-    lower, upper = (np.broadcast_to(limit, work.q.shape) for limit in positioner.robot.limits_rad.T)
-    again = np.zeros_like(work.q)
-    if cell.seam.closed:
-        again[0] = way_back(work.q) - work.q[0]  # the first point is passed twice, whole turns apart
-    highest = np.minimum(upper - np.maximum(again, 0.0) - need, work.q + RIGHT)
-    lowest = np.maximum(lower - np.minimum(again, 0.0) + need, work.q - RIGHT)
+    lowest, highest = table_limits(cell, positioner, work.q) + positioner.robot.dh[:, 3]
     columns = _posture_in_table(cell, positioner, s).transpose(0, 2, 1).reshape(-1, 9)
-    return [columns, 1.0 - 2.0 * work.branch[:, None], highest + offset, lowest + offset]
+    return [columns, 1.0 - 2.0 * work.branch[:, None], highest, lowest]
+
+
+def table_limits(cell: Cell, positioner: Positioner, q: np.ndarray) -> np.ndarray:
+    """Return lowest and highest joints at every seam point of an untilted path q (N, n), shape (2, N, n) [rad].
+
+    These are the limits less the solvers' margin, but no farther than a right angle from the untilted path: sines tell
+    the side of what is that near, however often a joint may turn.
+    """
+    need = np.radians(cell.constraints.joint_margin_deg)
+    lower, upper = (np.broadcast_to(limit, q.shape) for limit in positioner.robot.limits_rad.T)
+    again = np.zeros_like(q)
+    if cell.seam.closed:
+        again[0] = way_back(q) - q[0]  # the first point is passed twice, whole turns apart
+    highest = np.minimum(upper - np.maximum(again, 0.0) - need, q + RIGHT)
+    lowest = np.maximum(lower - np.minimum(again, 0.0) + need, q - RIGHT)
+    return np.stack([lowest, highest])
 
 
 def way_back(q: np.ndarray) -> np.ndarray:
