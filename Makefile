@@ -12,7 +12,7 @@ reproduce: $(VENV)/.stamp-main
 	$(RUN) experiments/reproduce_positioner.py
 
 test: $(VENV)/.stamp-test
-	$(RUN) -m pytest
+	$(RUN) -m pytest -n 2 --dist loadfile
 
 lint: $(VENV)/.stamp-lint
 	$(RUN) -m ruff check .

@@ -6,5 +6,5 @@ Each part has a process of its own, so that the memory one takes does not count 
 import subprocess
 import sys
 
-for part in ("benchmarks.ratios", "benchmarks.scaling", "benchmarks.forms"):
+for part in ("benchmarks.ratios", "benchmarks.scaling", "benchmarks.forms", "benchmarks.studies"):
     subprocess.run([sys.executable, "-m", part], check=True)

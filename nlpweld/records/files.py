@@ -36,8 +36,12 @@ def sealed(data: Mapping[str, Any]) -> str:
     return f"{OPENING.decode()}{digest}{CLOSING.decode()}\n{body}"
 
 
-def read_record(path: Path) -> Record:
+def read_record(path: Path, trace: bool = True) -> Record:
     """Read a record.
+
+    Args:
+        path: of the file.
+        trace: whether to read its trace, which is most of it, too.
 
     Raises:
         OutputError: it cannot be read, is no record, was edited or cut, or is of another version than this nlpweld's.
@@ -51,6 +55,8 @@ def read_record(path: Path) -> Record:
         raise OutputError(f"{path}: {_what_it_is(text)}; {MEND}")
     if hashlib.sha256(body).hexdigest().encode() != head[len(OPENING) : -len(CLOSING)]:
         raise OutputError(f"{path}: digest: the record was edited or cut; {MEND}")
+    if not trace:
+        body = b"\n".join(line for line in body.split(b"\n") if not line.startswith(b'"trace": '))
     try:
         return Record.model_validate_json(b"{" + body)
     except ValidationError as error:

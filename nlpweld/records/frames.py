@@ -23,15 +23,15 @@ PER_ROBOT = ("manipulability_mean", "manipulability_min", "singularity_min")
 DECISIVE = ("cell_hash", "options", "budget")  # runs that differ in one of these do not belong in one row of a table
 
 
-def study_records(folder: str | Path) -> list[tuple[Path, Record]]:
-    """Return the files and records of a study.
+def study_records(folder: str | Path, traces: bool = True) -> list[tuple[Path, Record]]:
+    """Return the files and records of a study, with their traces or, sooner, without.
 
     Raises:
         OptionError: the folder holds no records.
         OutputError: a record is broken, of another version, or was made under other terms than its neighbours.
     """
     folder = Path(folder)
-    records = [(path, read_record(path)) for path in record_files(folder)]
+    records = [(path, read_record(path, traces)) for path in record_files(folder)]
     if not records:
         raise OptionError(f"{folder}: holds no records; make some with 'nlpweld compare CELL --out {folder}'")
     _refuse_mixture(records)

@@ -20,7 +20,7 @@ def load_records(folder: str | Path) -> pd.DataFrame:
         OptionError: the folder holds no records.
         OutputError: a record is broken, of another version, or was made under other terms than its neighbours.
     """
-    found = study_records(folder)
+    found = study_records(folder, traces=False)
     files = [path.relative_to(folder).as_posix() for path, _ in found]
     return runs_frame((record for _, record in found), file=files)
 

@@ -24,8 +24,8 @@ class Study:
 
     @cached_property
     def records(self) -> list[tuple[Path, Record]]:
-        """Files and records."""
-        return study_records(self.folder)
+        """Files and records, without their traces."""
+        return study_records(self.folder, traces=False)
 
     @cached_property
     def runs(self) -> pd.DataFrame:
@@ -36,7 +36,7 @@ class Study:
     @cached_property
     def traces(self) -> pd.DataFrame:
         """One row a step of a run."""
-        return traces_frame(record for _, record in self.records)
+        return traces_frame(record for _, record in study_records(self.folder))
 
     @cached_property
     def answers(self) -> pd.DataFrame:

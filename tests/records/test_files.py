@@ -38,6 +38,13 @@ def test_a_record_comes_back_as_it_was_written(tmp_path):
     assert json.loads(path.read_text())["seed"] == 3  # plain JSON for everybody else
 
 
+def test_a_trace_may_be_left_out(tmp_path):
+    path = store(tmp_path)
+    bare = read_record(path, trace=False)
+    assert bare.trace.time_s == []
+    assert bare == record(trace={})
+
+
 @pytest.mark.parametrize("at", [0, 1, 40, 200, -1])
 def test_a_record_cut_anywhere_is_named(tmp_path, at):
     path = store(tmp_path)
