@@ -1,7 +1,6 @@
 """The folder of a study: one record per task, skipped when its key matches, and one runner at a time."""
 
 import contextlib
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from nlpweld.plan import WRITING, write_text
 from nlpweld.records import files
 from nlpweld.records.model import Record
 
-LOCK, OWNER = ".lock", ".owner"
+LOCK = ".lock"
 
 
 def record_path(folder: Path, task: Task) -> Path:
@@ -56,21 +55,12 @@ def owned(folder: Path) -> Iterator[None]:
         write_text(records / ".probe", "").unlink()
         lock.acquire()
     except Timeout:
-        raise OutputError(f"{folder}: another run ({_owner(records)}) is writing here; wait for it or choose another "
-                          "--out") from None  # fmt: skip
+        raise OutputError(f"{folder}: another run is writing here; wait for it or choose another --out") from None
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error.strerror}); choose another --out") from None
     try:
-        write_text(records / OWNER, f"process {os.getpid()}\n")
         for left in records.rglob(f"{WRITING}*"):  # by a runner that was killed while it wrote
             left.unlink(missing_ok=True)
         yield
     finally:
         lock.release()
-
-
-def _owner(records: Path) -> str:
-    try:
-        return (records / OWNER).read_text(encoding="utf-8").strip()
-    except OSError:
-        return "of an unknown process"

@@ -14,6 +14,7 @@ from nlpweld.stats.pairs import paired
 from nlpweld.stats.profiles import data_profile, ecdf, performance_profile, work_table
 from nlpweld.stats.targets import GAPS, hits, regrets
 
+STATED, BEST = "stated reference", "best verified of this study"
 SHIFT_S = 1.0  # of shifted geometric means
 GROUP = [*PROBLEM, *SOLVER]
 
@@ -44,23 +45,21 @@ class Statistics:
         """What regret is counted from, by (cell, formulation).
 
         The stated optimum, which holds for the paper's formulation, or else the best answer verified in this study,
-        whichever is better. The second flatters whoever found it, so :attr:`reference_kind` says which it is.
+        which flatters whoever found it; :attr:`reference_kind` says which it is.
         """
         good = self.runs[self.runs["verified"]]
         best = good.groupby(PROBLEM)["objective"].max()
         stated = {(cell, "reduced"): value for cell, value in self.stated.items()}
         index = best.index.union(pd.MultiIndex.from_tuples(stated, names=PROBLEM)) if stated else best.index
-        return best.reindex(index).combine(pd.Series(stated, index=index, dtype=float), np.fmax)
+        return pd.Series(stated, index=index, dtype=float).fillna(best.reindex(index))
 
     @cached_property
     def reference_kind(self) -> dict[tuple[str, str], str]:
         """Where each reference comes from."""
-        kinds = {}
-        for problem, value in self.reference.items():
-            cell, formulation = problem
-            told = formulation == "reduced" and value == self.stated.get(cell)
-            kinds[problem] = "stated reference" if told else "best verified of this study"
-        return kinds
+        return {
+            (cell, formulation): STATED if formulation == "reduced" and cell in self.stated else BEST
+            for cell, formulation in self.reference.index
+        }
 
     @cached_property
     def judged(self) -> pd.DataFrame:

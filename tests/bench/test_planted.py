@@ -52,5 +52,5 @@ def test_bad_solvers_cost_one_record_each(cell, tmp_path, planted):
 
     table = write_tables(tmp_path).set_index("solver")
     assert table.loc["liar", ["claimed", "verified"]].tolist() == [1, 0]
-    assert table.loc["liar", ["mmr_mean", "mmr_best"]].isna().all()
-    assert table["mmr_best"].notna().sum() == 1
+    assert table.loc["liar", ["objective_mean", "objective_best"]].isna().all()
+    assert table["objective_best"].notna().sum() == 1

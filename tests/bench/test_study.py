@@ -54,7 +54,7 @@ def test_options_of_a_solver_get_a_name(tmp_path):
         ('cells = ["three_er16"]\nsolvers = [{ solver = "ga", options = { popl = 3 }, variant = "x" }]', "'popl'"),
         ('cells = ["three_er16"]\nsolvers = [{ solver = "ga", options = { population = 3 } }]', "without a variant"),
         ('cells = ["three_er16"]\nsolvers = ["ga"]\nformulations = ["reducd"]', "formulation 'reducd'"),
-        ('cells = ["three_er16"]\nsolvers = ["ga"]\nvary = { "seam.pionts" = [3] }', "did you mean 'points'"),
+        ('cells = ["three_er16"]\nsolvers = ["ga"]\nvary = { "seam.pionts" = [3] }', "seam.pionts: unknown field"),
         ('cells = ["three_er16"]\nsolvers = ["ga"]\nvary = { "stations.weldr.tool" = [3] }', "did you mean 'welder'"),
         ('cells = ["three_er16"]\nsolvers = ["ga"]\nset = { "workpiece.main_radius_m" = -1.0 }', "main_radius_m"),
         ('cells = ["three_er16"]\nsolvers = ["ga"]\nseeds = 0', "seeds"),

@@ -15,7 +15,6 @@ cells = ["robot_positioner"]
 solvers = ["random_search"]
 seeds = 2
 evaluations = 200
-set = { "seam.points" = 19 }
 label = "coarse"
 """
 

@@ -55,8 +55,8 @@ def test_published_placements_are_verified_and_have_the_prototypes_values(study)
     for name, value in PLACEMENTS.items():
         row = table.loc[f"Zhang et al. {name}"]
         assert row["verified"] == 1
-        assert row["mmr_mean"] == pytest.approx(value, abs=1e-6)
-    assert table.loc["nominal", "mmr_mean"] == pytest.approx(0.489716, abs=1e-6)
+        assert row["objective_mean"] == pytest.approx(value, abs=1e-6)
+    assert table.loc["nominal", "objective_mean"] == pytest.approx(0.489716, abs=1e-6)
 
 
 def test_references_are_verified_and_have_the_prototypes_values(study):

@@ -8,6 +8,7 @@ from nlpweld.report import style
 from nlpweld.report.figures import Drawing
 from nlpweld.report.study import Study
 
+TABLE = "data/robust.csv"
 ANSWERS = (
     ("nominal", style.ORANGE, "--", "s", "nominal optimum"),
     ("robust ipopt", style.BLUE, "-", "o", "robust optimum, Ipopt"),
@@ -16,8 +17,8 @@ ANSWERS = (
 
 
 def drawings(study: Study) -> list[Drawing]:
-    """Return the one figure of the robust study."""
-    return [Drawing("robust", worst_cases, ("data/robust.csv",))]
+    """Return the one figure of the robust study; none for a study without its table."""
+    return [] if study.missing((TABLE,)) else [Drawing("robust", worst_cases, (TABLE,))]
 
 
 def worst_cases(study: Study) -> Figure:
