@@ -33,10 +33,11 @@ from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
 from nlpweld.formulation.over_seam import over_seam
 from nlpweld.formulation.paths import Limits, allowed, best_wrist, joint_paths, limit_margins, on_wrist, settle
 from nlpweld.formulation.seam_point import LEVER_M, SeamPoint, closure_function, facts_function, full_term, moved
+from nlpweld.formulation.sides import Sides
 from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps
 from nlpweld.formulation.stage import GAP_SCALE_M, Stage
 from nlpweld.geometry.seam import seam_parameters
-from nlpweld.kinematics.ik import ELBOW, SHOULDER, WRIST, signs
+from nlpweld.kinematics.ik import WRIST, signs
 from nlpweld.kinematics.manipulability import magnitude
 from nlpweld.plan import Plan
 
@@ -47,7 +48,6 @@ LEVELS = (1e-3, 1e3)  # bounds of a level, which is of order one
 SCOUTS = 256  # random placements of which the best are started from
 NEAREST = 32  # scouts that tell which bodies come near each other
 NEAR_M = 0.2  # and what is near
-SIDES = (SHOULDER, ELBOW, WRIST)
 
 
 def full(cell: Cell, engine: str = "auto") -> Nlp:
@@ -138,6 +138,11 @@ class Full:
         """How variables are ordered."""
         return Arrow(len(self.cell.variables) + self.point.levels, self.point.own, self.data)
 
+    @property
+    def sides(self) -> Sides:
+        """How branches are read off joints."""
+        return Sides(self.cell.configuration, self.batch.modes)
+
     @cached_property
     def facts(self) -> ca.Function:
         """What the exact model looks at, at one seam point."""
@@ -216,14 +221,14 @@ class Full:
         step, limit = self._path(q)
         missed = self._missed_steps(step) | {
             "closure": open_by - CLOSED,
-            "branch": self._astray(factors),
+            "branch": self.sides.astray(factors),
             "joint_limit": (margin - limit) / np.pi,
             "singularity": (floor - w.min(axis=(1, 2))) / (floor or 1.0),
             "clearance": (levels.clearance_at_points_m - gap.min(axis=(1, 2))) / GAP_SCALE_M,
         }
         value = over_seam(self.cell.objective, mmr[..., 0])
         violation = np.maximum(0.0, np.column_stack([missed[name] for name in self.constraints]))
-        return Evaluation(np.where(np.isfinite(value), value, -np.inf), violation, self._modes(factors))
+        return Evaluation(np.where(np.isfinite(value), value, -np.inf), violation, self.sides.mode(factors))
 
     def _missed_steps(self, longest: np.ndarray) -> dict[str, np.ndarray]:
         """Return by how many half turns joints' longest steps (m,) [rad] are too long."""
@@ -254,32 +259,6 @@ class Full:
         margins = [limit_margins(robot, own).min(axis=1) for _, robot, own in self._each(settled)]
         return np.abs(np.diff(settled, axis=-1)).max(axis=(1, 2)), np.min(margins, axis=0)
 
-    def _astray(self, factors: np.ndarray) -> np.ndarray:
-        """Return the share of points with a robot on another side than at the first, or one not allowed, (m,)."""
-        side = self._sides(factors)
-        asked = side[:, :1].copy()
-        chosen = self.cell.configuration
-        for i, (name, all_) in enumerate(zip((chosen.shoulder, chosen.elbow, chosen.wrist), SIDES, strict=True)):
-            if name != "any":
-                asked[..., i] = all_[name]
-        return (side != asked).any(axis=(2, 3)).mean(axis=1)
-
-    def _sides(self, factors: np.ndarray) -> np.ndarray:
-        """Return the signs of shoulder, elbow and wrist, shape (m, N, S, 3)."""
-        return np.where(factors.reshape(*factors.shape[:2], -1, len(SIDES)) > 0.0, 1, -1)
-
-    def _branches(self, factors: np.ndarray) -> list[list[tuple[str, ...]]]:
-        """Return the names of the sides every station is on at the first point, for every candidate."""
-        named = [{sign: name for name, sign in side.items()} for side in SIDES]
-        first = self._sides(factors)[:, 0]
-        return [[tuple(n[int(i)] for n, i in zip(named, s, strict=True)) for s in stations] for stations in first]
-
-    def _modes(self, factors: np.ndarray) -> np.ndarray:
-        """Return which mode every candidate is on at its first point, (m,); 0 where that is none."""
-        modes = {mode: i for i, mode in enumerate(self.batch.modes)}
-        arms = [tuple((b[0], b[1]) for b in stations) for stations in self._branches(factors)]
-        return np.array([modes.get(arm, 0) for arm in arms])
-
     def unpack(self, z: np.ndarray, mode: int) -> Plan:
         """Return the plan of variables z (n,); its branches are those z is on, whatever the mode."""
         cell, z = self.cell, np.asarray(z, dtype=float)
@@ -290,7 +269,7 @@ class Full:
         turned = held(cell, s).q
         if cell.positioner and turned is not None:
             paths.setdefault(cell.positioner.name, turned)
-        found = self._branches(self._judged(z[None])[2])[0]
+        found = self.sides.branches(self._judged(z[None])[2])[0]
         branches = {st.name: (b[0], b[1], b[2]) for st, b in zip(cell.stations, found, strict=True)}
         return Plan(cell.laid_out(x), placement[:3], s, paths, branches, float(placement[3]))
 
