@@ -1,6 +1,7 @@
 """Ever sharper penalties: the loop all solvers on derivatives share, with the inner minimiser left to each of them."""
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -35,7 +36,7 @@ Minimiser = Callable[[np.ndarray, float], Minimum]  # from a start (n,), at a sh
 
 
 @dataclass(frozen=True)
-class Homotopy:
+class Homotopy(ABC):
     """Solves of ever sharper penalties, each started from the last.
 
     A descent that ends infeasible (the penalties' own local minimum), or below the best scout, is followed by one
@@ -70,9 +71,9 @@ class Homotopy:
         """Return why this solver cannot take the problem, or None when it can."""
         return None if nlp.relax else f"formulation '{nlp.formulation}' has no derivatives"
 
+    @abstractmethod
     def minimiser(self, nlp: Nlp, relax: Relaxation, watch: Watch) -> Minimiser:
         """Return what minimises a relaxation over the box from a start, and shows every iterate to the watch."""
-        raise NotImplementedError
 
     def solve(self, nlp: Nlp, *, seed: int, budget: Budget) -> Outcome:
         """Descend from random starts in the box until one ends feasible, and no worse than the best scout."""

@@ -15,7 +15,7 @@ from tests.records.made import record, store
 SCHEMA = LIBRARY / "schemas" / f"record-{VERSION}.json"
 
 
-def refused(path, *told):
+def assert_refused(path, *told):
     with pytest.raises(OutputError) as caught:
         read_record(path)
     text = str(caught.value)
@@ -49,7 +49,7 @@ def test_a_trace_may_be_left_out(tmp_path):
 def test_a_record_cut_anywhere_is_named(tmp_path, at):
     path = store(tmp_path)
     path.write_bytes(path.read_bytes()[:at])
-    refused(path)
+    assert_refused(path)
 
 
 @pytest.mark.parametrize(("old", "new"), [('"seed": 0', '"seed": 1'), ('"mmr_mean": 0.29', '"mmr_mean": 0.39')])
@@ -58,34 +58,34 @@ def test_an_edited_record_is_named(tmp_path, old, new):
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
-    refused(path, "digest", "edited or cut", "run it again")
+    assert_refused(path, "digest", "edited or cut", "run it again")
 
 
 def test_a_record_written_anew_by_an_editor_is_named(tmp_path):
     path = store(tmp_path)
     path.write_text(json.dumps(json.loads(path.read_text()), indent=2))
-    refused(path, "digest: missing")
+    assert_refused(path, "digest: missing")
 
 
 def test_newer_and_older_versions_are_named(tmp_path):
     path = store(tmp_path)
     resealed(path, version=VERSION + 1)
-    refused(path, "version", f"newer than {VERSION}", "update nlpweld")
+    assert_refused(path, "version", f"newer than {VERSION}", "update nlpweld")
     path.write_text('{"format": "nlpweld-record", "version": 2}')
-    refused(path, f"older than {VERSION}")
+    assert_refused(path, f"older than {VERSION}")
 
 
 def test_what_breaks_the_schema_is_named_by_its_field(tmp_path):
     path = store(tmp_path)
     resealed(path, seed="three")
-    refused(path, "seed", "integer")
+    assert_refused(path, "seed", "integer")
 
 
 @pytest.mark.parametrize("text", ["[]", "{}", '{"format": "nlpweld-plan"}', "\x00", "{"])
 def test_what_is_no_record_is_named(tmp_path, text):
     path = tmp_path / "a.json"
     path.write_text(text)
-    refused(path, "remove it")
+    assert_refused(path, "remove it")
 
 
 def test_nan_never_gets_into_a_record():

@@ -8,7 +8,7 @@ from nlpweld.records.frames import answers_frame, runs_frame, study_records, tra
 from tests.records.made import record, report, store
 
 
-def refused(error, folder, *told):
+def assert_refused(error, folder, *told):
     with pytest.raises(error) as caught:
         study_records(folder)
     text = str(caught.value)
@@ -64,15 +64,15 @@ def test_only_confirmed_answers_count():
 
 
 def test_empty_and_absent_folders_are_named(tmp_path):
-    refused(OptionError, tmp_path, tmp_path, "no records", "nlpweld compare")
-    refused(OptionError, tmp_path / "nowhere", "nowhere", "no records")
+    assert_refused(OptionError, tmp_path, tmp_path, "no records", "nlpweld compare")
+    assert_refused(OptionError, tmp_path / "nowhere", "nowhere", "no records")
 
 
 @pytest.mark.parametrize("change", [{"cell_hash": "x"}, {"budget": {"evaluations": 7}}, {"options": {"a": 1}}])
 def test_runs_made_under_other_terms_do_not_share_a_row(tmp_path, change):
     store(tmp_path, seed=0)
     path = store(tmp_path, seed=1, **change)
-    refused(OutputError, tmp_path, path, next(iter(change)), "seed000.json")
+    assert_refused(OutputError, tmp_path, path, next(iter(change)), "seed000.json")
 
 
 def test_other_solvers_may_have_other_budgets(tmp_path):
