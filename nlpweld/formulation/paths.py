@@ -27,6 +27,20 @@ def joint_paths(robot: Robot, cos_sin: Lanes, closed: bool) -> np.ndarray:
     return np.unwrap(theta, axis=-1) - robot.dh[:, 3][:, None]
 
 
+def turns(phase: np.ndarray, closed: bool) -> np.ndarray:
+    """Return how far joints turn from each seam point to the next, and back to the first if the seam is closed.
+
+    Args:
+        phase: cosines plus i times sines of joint angles, shape (..., N).
+        closed: whether the seam is.
+
+    Returns:
+        signed steps within half a turn, shape (..., N) or, open, (..., N - 1) [rad].
+    """
+    steps = np.angle(np.roll(phase, -1, axis=-1) * phase.conj())
+    return steps if closed else steps[..., :-1]
+
+
 def flip(robot: Robot, q: np.ndarray) -> np.ndarray:
     """Return the same tool paths with the other wrist: theta4 + pi, -theta5, theta6 + pi; shape (..., 6, M)."""
     other = q.copy()

@@ -21,7 +21,7 @@ from nlpweld.formulation.freedom import free_angles
 from nlpweld.formulation.holder import held
 from nlpweld.formulation.margins import with_margins
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation, sobol
-from nlpweld.formulation.paths import limit_margins
+from nlpweld.formulation.paths import limit_margins, turns
 from nlpweld.formulation.reduced import OutOfReach, Unpacker
 from nlpweld.formulation.smooth import Gaps, all_gaps, near_gaps, step_function, term_function, value_pieces
 from nlpweld.formulation.splines import basis
@@ -198,8 +198,7 @@ class Redundant:
             found.append(self._table(points)[0])
         for cos_sin in map(np.array, found):
             phase = cos_sin[:, ::2] + 1j * cos_sin[:, 1::2]
-            turned = np.roll(phase, -1, axis=1) * phase.conj()
-            longest = max(longest, float(np.abs(np.angle(turned[:, : n if self.cell.seam.closed else n - 1])).max()))
+            longest = max(longest, float(np.abs(turns(phase, self.cell.seam.closed)).max()))
         return longest
 
     def unpack(self, z: np.ndarray, mode: int) -> Plan | OutOfReach:

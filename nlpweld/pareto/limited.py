@@ -1,0 +1,106 @@
+"""A problem that must also keep a level of something its cell has no level of: joint travel, or a toy's second aim."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from nlpweld.formulation.batch import Batch
+from nlpweld.formulation.derivatives import by_casadi
+from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation
+from nlpweld.kinematics.ik import signs
+from nlpweld.pareto.aims import AIMS, Meter
+
+BLUNT_RAD = 0.3  # over the sharpness: below such a step |dq| is round
+
+Second = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of candidates (m, d) on modes (m,), shape (m,); maximised
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A second value of a problem's candidates, to be maximised.
+
+    Attributes:
+        name: of the constraint that asks for a level of it.
+        exact: its value.
+        smooth: ``mode -> Relaxation`` of minus the value, which tends to the exact one as the sharpness grows.
+    """
+
+    name: str
+    exact: Second
+    smooth: Callable[[int], Relaxation]
+
+
+def at_least(nlp: Nlp, side: Side, level: float, unit: float) -> Nlp:
+    """Return a problem with one constraint more: ``side >= level``.
+
+    Args:
+        nlp: the problem; its relaxation has no equalities.
+        side: the second value.
+        level: what it must be at least.
+        unit: a miss that counts as one.
+    """
+
+    def evaluate(X: np.ndarray) -> Evaluation:
+        found = nlp.evaluate(X)
+        missed, looked = np.zeros((len(X), 1)), found.feasible
+        missed[looked, 0] = np.maximum(0.0, level - side.exact(np.atleast_2d(X)[looked], found.mode[looked])) / unit
+        return Evaluation(found.objective, np.hstack([found.violation, missed]), found.mode)
+
+    def relax(mode: int, whole: bool) -> Relaxation:
+        assert nlp.relax is not None
+        return _with_penalty(nlp.relax(mode, whole), side.smooth(mode), level, unit)
+
+    widened = nlp.widened
+    return replace(
+        nlp,
+        constraints=(*nlp.constraints, side.name),
+        evaluate=evaluate,
+        relax=relax,
+        widened=widened and (lambda extra: at_least(widened(extra), side, level, unit)),
+        rebuild=None,
+    )
+
+
+def _with_penalty(base: Relaxation, side: Relaxation, level: float, unit: float) -> Relaxation:
+    """Return a relaxation plus ``softplus(s * (side + level) / unit) / s`` at sharpness s; side is minus the value."""
+    x, s = ca.MX.sym("x", base.value.size1_in(0)), ca.MX.sym("sharpness")
+    missed = s * (side.value(x, s) + level) / unit
+    penalty = (ca.fmax(missed, 0) + ca.log1p(ca.exp(-ca.fabs(missed)))) / s
+    slope = 0.5 * (1 + ca.tanh(missed / 2)) / unit
+    bend = s * slope * (1 / unit - slope)
+    g = ca.reshape(side.gradient(x, s), -1, 1)
+    gradient = ca.reshape(base.gradient(x, s), -1, 1) + slope * g
+    hessian = base.hessian(x, s) + slope * side.hessian(x, s) + bend * (g @ g.T)
+    outputs = {"value": base.value(x, s) + penalty, "gradient": gradient, "hessian": hessian}
+    names = ["x", "sharpness"]
+    return Relaxation(*(ca.Function(name, [x, s], [out], names, [name]) for name, out in outputs.items()))
+
+
+def less_travel(batch: Batch) -> Side:
+    """Return minus the joint travel of a cell's reduced form, with derivatives.
+
+    Smoothly it is ``sum sqrt(dq^2 + (blunt/s)^2)`` over stations, joints and neighbouring points, never less than the
+    travel itself; s is the sharpness.
+    """
+    meter = Meter(batch, AIMS["travel_rad"])
+    return Side("travel", lambda X, mode: -meter(X, mode), lambda mode: _smooth_travel(batch, mode))
+
+
+def _smooth_travel(batch: Batch, mode: int) -> Relaxation:
+    """Return the sum over neighbouring seam points of what joints turn between them."""
+    count, points = len(batch.points), batch.points
+    x, both, s = ca.SX.sym("x", len(batch.cell.variables)), ca.SX.sym("points", 2 * count), ca.SX.sym("sharpness")
+    travel = ca.SX(0)
+    for grip, branch in zip(batch.stage.grips, batch.modes[mode], strict=True):
+        side = ca.DM(signs((*branch, "noflip")))
+        here, there = (grip(x, point, side)[0] for point in ca.vertsplit(both, count))
+        cos = ca.sum2(here * there)
+        sin = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+        travel += ca.sum1(ca.sqrt(ca.atan2(sin, cos) ** 2 + (BLUNT_RAD / s) ** 2))
+    pairs = np.vstack([points, np.roll(points, -1, axis=1)])
+    return by_casadi(
+        ca.Function("travel", [x, both, s], [travel], ["x", "points", "sharpness"], ["travel"], {"cse": True}),
+        pairs if batch.cell.seam.closed else pairs[:, :-1],
+    )
