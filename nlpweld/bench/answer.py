@@ -180,10 +180,17 @@ def _once(nlp: Nlp, solver: Solver, seed: int, budget: Budget) -> Answer:
         nlp.prepare()
     prepared_s = time.perf_counter() - began
     outcome = solver.solve(nlp, seed=seed, budget=budget)
-    outcome = replace(outcome, build_s=prepared_s + outcome.build_s)
+    outcome = replace(_later(outcome, prepared_s), build_s=prepared_s + outcome.build_s)
     if outcome.x is None:
         return Answer(outcome, None, None)
     return Answer(outcome, *evaluate_plan(nlp, outcome.x, outcome.mode))
+
+
+def _later(outcome: Outcome, by_s: float) -> Outcome:
+    """Return an outcome whose steps and improvements happened later, for what had gone before."""
+    trace = tuple(replace(step, time_s=step.time_s + by_s) for step in outcome.trace)
+    improvements = tuple(replace(step, time_s=step.time_s + by_s) for step in outcome.improvements)
+    return replace(outcome, trace=trace, improvements=improvements)
 
 
 def _left(budget: Budget, spent: Outcome) -> Budget | None:
@@ -197,7 +204,8 @@ def _left(budget: Budget, spent: Outcome) -> Budget | None:
 
 def _after(first: Answer, second: Answer, round_: int) -> Answer:
     """Return the second answer with the cost of both, its plan in the cell as it is stated."""
-    a, b = first.outcome, second.outcome
+    a = first.outcome
+    b = _later(second.outcome, a.build_s + a.solve_s)
     plan = second.plan
     if plan is not None and first.plan is not None:
         stated = first.plan.cell.model_copy(update={"stations": plan.cell.stations})  # each has its own layout
