@@ -100,11 +100,15 @@ def format_summary(table: pd.DataFrame, width: int = 100) -> Table:
 
     Args:
         table: as from :func:`summary`.
-        width: columns of the screen; below 100 the best MMR and the build time are left out, which fits 80.
+        width: columns of the screen; below 100 the best MMR and the build time are left out, and what is maximised
+            stands beside the cell's name, which fits 80.
     """
     text = _as_text(table)
+    cells = table["cell"].astype(str)
     if width < WIDE:
         text = text.drop(columns=["best", "build s"])
+        if "maximised" in text:
+            cells += ": " + text.pop("maximised")
     shown = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
     for name in text.columns:
         left = name in ("solver", "maximised")
@@ -115,7 +119,7 @@ def format_summary(table: pd.DataFrame, width: int = 100) -> Table:
             no_wrap=not left,
         )
     previous = None
-    for cell, values in zip(table["cell"], text.to_numpy(), strict=True):
+    for cell, values in zip(cells, text.to_numpy(), strict=True):
         if cell != previous:
             shown.add_row(escape(cell), style="bold cyan")
         shown.add_row(escape(f"  {values[0]}"), *values[1:])

@@ -156,3 +156,12 @@ def test_older_records_maximise_the_mean(folder, add):
     runs = load_records(folder)
     assert (runs["objective"] == 0.29).all()
     assert (runs["over_seam"] == "mean").all()
+
+
+def test_on_a_narrow_screen_what_is_maximised_stands_beside_the_cell(folder, add, asked):
+    add(cell="a", report=asked(0.4, reading="product"))
+    add(cell="b")
+    table = rows(folder).reset_index()
+    for width, wanted in ((100, []), (80, ["a: product of w", "b: MMR"])):
+        first = list(format_summary(table, width).columns[0].cells)
+        assert [cell for cell in first if ":" in str(cell)] == wanted
