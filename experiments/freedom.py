@@ -32,7 +32,9 @@ def freedom_table(records: list[Record]) -> pd.DataFrame:
     groups: dict[tuple[str, str], list[Record]] = {}
     for record in records:
         groups.setdefault((record.cell, record.formulation), []).append(record)
-    rows = [{"cell": cell, "formulation": form, **_row(runs)} for (cell, form), runs in groups.items()]
+    cells = list(dict.fromkeys(cell for cell, _ in groups))
+    ordered = sorted(groups.items(), key=lambda group: cells.index(group[0][0]))  # a cell's rows together
+    rows = [{"cell": cell, "formulation": form, **_row(runs)} for (cell, form), runs in ordered]
     columns = ["cell", "formulation", "runs", "verified", "mmr_mean", "mmr_min", "joint_step_deg", "found"]
     table = pd.DataFrame(rows, columns=[*columns, "solve_s", "build_s"])
     plain = table[table.formulation == "reduced"].set_index("cell").mmr_mean
