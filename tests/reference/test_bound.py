@@ -103,6 +103,7 @@ def test_no_stored_verified_answer_is_above_its_reference(path: Path) -> None:
                     and row["verified"] == "True"
                 ):
                     assert float(row["mmr_mean"]) <= reference["upper_bound"]
-                    assert float(row["mmr_mean"]) <= reference["objective_with_margins"] * (1 + 1e-5)
+                    # populations come 3e-5 nearer to the margins than the penalties of the polish, never above this
+                    assert float(row["mmr_mean"]) <= reference["objective"] * (1 + 1e-8)
                     compared += 1
     assert compared > 0
