@@ -26,8 +26,8 @@ class Reference:
         objective: best verified mean MMR, in the reading's unit.
         placement: x, y, z [m] and yaw [rad] of {P} there.
         branches: shoulder, elbow and wrist of every station there.
-        objective_with_margins: the best verified that Ipopt polished within the solvers' margins; its penalties stop just
-            short of them, so that populations may end a few 1e-5 above.
+        objective_with_margins: the best verified that Ipopt polished within the solvers' margins; its penalties stop
+            just short of them, so that populations may end a few 1e-5 above.
         placement_with_margins: where.
         upper_bound: no feasible placement has a higher mean MMR; null where the search ended without a bound.
         rigorous: whether the bound is proven; else it would be a sample's.
