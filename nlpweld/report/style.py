@@ -56,6 +56,16 @@ def figure(height_mm: float = 60.0, columns: int = 1) -> Figure:
     return Figure(figsize=(columns * WIDTH_IN, height_mm / 25.4), layout="constrained")
 
 
+def columns_for(series: int) -> int:
+    """Return how many columns a figure of so many series takes."""
+    return 1 if series <= len(SERIES) else 2
+
+
+def look(i: int) -> dict[str, Any]:
+    """Return colour and line style of series i; 36 of them differ in one or both."""
+    return {"color": SERIES[i % len(SERIES)], "ls": LINES[(i + i // len(SERIES)) % len(LINES)]}
+
+
 def space(fig: Figure, elevation: float = 22.0, azimuth: float = -60.0, **where: Any) -> Any:
     """Return 3-D axes with equal scales, metres and a light grid."""
     layout: Any = fig.get_layout_engine()

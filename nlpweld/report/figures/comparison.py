@@ -45,7 +45,8 @@ def labelled(table: pd.DataFrame, cell: str) -> pd.DataFrame:
 def mmr_by_solver(study: Study, cell: str) -> Figure:
     """Draw mean MMR of every run that brought numbers, verified or not, by solver."""
     runs = labelled(study.runs, cell)
-    fig = style.figure(58)
+    columns = style.columns_for(runs["label"].nunique())
+    fig = style.figure(38 + 20 * columns**2, columns)
     axes = fig.add_subplot()
     labels = sorted(runs["label"].unique())
     for i, label in enumerate(labels):
@@ -61,7 +62,8 @@ def mmr_by_solver(study: Study, cell: str) -> Figure:
 def solve_time_by_solver(study: Study, cell: str) -> Figure:
     """Draw the solve time of every run that ended by itself, on a logarithmic axis."""
     runs = labelled(study.runs, cell)
-    fig = style.figure(58)
+    columns = style.columns_for(runs["label"].nunique())
+    fig = style.figure(38 + 20 * columns**2, columns)
     axes = fig.add_subplot()
     axes.set_yscale("log")
     labels = sorted(runs["label"].unique())
@@ -81,20 +83,20 @@ def solve_time_by_solver(study: Study, cell: str) -> Figure:
 def progress(study: Study, cell: str) -> Figure:
     """Draw the best MMR so far against evaluations of the model: median and quartiles over seeds."""
     traces = labelled(study.traces, cell)
-    fig = style.figure(64)
+    columns = style.columns_for(traces["label"].nunique())
+    fig = style.figure(64, columns)
     axes = fig.add_subplot()
     axes.set_xscale("log")
     for i, (label, steps) in enumerate(traces.groupby("label")):
         grid, best = best_so_far(steps)
-        colour = style.SERIES[i % len(style.SERIES)]
         low, middle, high = _quartiles(best)
-        axes.fill_between(grid, low, high, color=colour, alpha=0.2, linewidth=0, step="post")
-        axes.step(grid, middle, where="post", color=colour, ls=style.LINES[i % len(style.LINES)], label=label)
+        axes.fill_between(grid, low, high, color=style.look(i)["color"], alpha=0.2, linewidth=0, step="post")
+        axes.step(grid, middle, where="post", label=label, **style.look(i))
     _reference(axes, study.baselines, cell)
     style.plain_log(axes.xaxis)
     label = objective_label(study.runs[study.runs["cell"] == cell], "best", " so far")
     style.name_axes(axes, "evaluations", label, f"{cell}: median, quartiles of seeds")
-    style.legend_below(axes, 3)
+    style.legend_below(axes, 2 + columns)
     return fig
 
 
@@ -153,9 +155,12 @@ def _strip(axes: Axes, place: int, runs: pd.DataFrame, column: str, colour: str)
 def _solver_axis(axes: Axes, runs: pd.DataFrame, labels: list[str]) -> None:
     counts = runs.groupby("label")["verified"].agg(["sum", "size"])
     # names side by side must not meet
-    shown = {label: label.replace("_", "\n").replace(":", ":\n") for label in labels}
-    names = [f"{shown[label]}\n({counts.loc[label, 'sum']}/{counts.loc[label, 'size']})" for label in labels]
-    axes.set_xticks(range(len(labels)), names)
+    many = style.columns_for(len(labels)) > 1
+    shown = {label: label if many else label.replace("_", "\n").replace(":", ":\n") for label in labels}
+    between = " " if many else "\n"
+    names = [f"{shown[label]}{between}({counts.loc[label, 'sum']}/{counts.loc[label, 'size']})" for label in labels]
+    turned = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"} if many else {}
+    axes.set_xticks(range(len(labels)), names, **turned)
     axes.set_xlim(-0.6, len(labels) - 0.4)
     axes.grid(axis="x", visible=False)
 

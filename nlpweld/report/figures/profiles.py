@@ -49,12 +49,13 @@ def anytime(study: Study, own: partial, title: str) -> Figure:
     """Draw median and quartiles over seeds of the regret of the best verified answer held at a time."""
     curves = own(study)
     curves = curves.assign(label=_labels(curves))
-    fig = style.figure(64)
+    columns = style.columns_for(curves["label"].nunique())
+    fig = style.figure(64, columns)
     axes = fig.add_subplot()
     axes.set_xscale("log")
     axes.set_yscale("log")
     for i, (label, curve) in enumerate(curves.groupby("label")):
-        look = {"color": style.SERIES[i % len(style.SERIES)], "ls": style.LINES[i % len(style.LINES)]}
+        look = style.look(i)
         low, middle, high = (np.maximum(100 * curve[name].to_numpy(), BEST) for name in ("lower", "median", "upper"))
         middle, high = (np.where(np.isfinite(values), values, np.nan) for values in (middle, high))
         axes.step(curve["time_s"], middle, where="post", label=label, **look)
@@ -62,7 +63,7 @@ def anytime(study: Study, own: partial, title: str) -> Figure:
     style.plain_log(axes.xaxis)
     style.plain_log(axes.yaxis)
     style.name_axes(axes, "build and solve [s]", "regret of what is verified [%]", title)
-    style.legend_below(axes, 3)
+    style.legend_below(axes, 2 + columns)
     return fig
 
 
@@ -77,15 +78,15 @@ def _labels(table: pd.DataFrame) -> pd.Series:
 
 
 def _profile(steps: pd.DataFrame, column: str, x: str, y: str) -> Figure:
-    fig = style.figure(64)
+    columns = style.columns_for(steps["solver"].nunique())
+    fig = style.figure(64, columns)
     axes = fig.add_subplot()
     axes.set_xscale("log")
     for i, (label, own) in enumerate(steps.groupby("solver")):
-        look = {"color": style.SERIES[i % len(style.SERIES)], "ls": style.LINES[i % len(style.LINES)]}
         own = own[own[column] > 0.0]
-        axes.step(own[column], own["share"], where="post", label=label, **look)
+        axes.step(own[column], own["share"], where="post", label=label, **style.look(i))
     axes.set_ylim(-0.02, 1.02)
     style.plain_log(axes.xaxis)
     style.name_axes(axes, x, y, f"to a verified answer within {TARGETS}")
-    style.legend_below(axes, 3)
+    style.legend_below(axes, 2 + columns)
     return fig
