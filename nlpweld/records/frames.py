@@ -70,6 +70,12 @@ def answers_frame(records: Iterable[Record]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*HEAD, "time_s", "evaluations", "objective"])
 
 
+def contestants(table: pd.DataFrame) -> pd.Series:
+    """Return what the solver of each row is called: its name, and its preset where that is not the default."""
+    preset = table["preset"].where(table["preset"] != "default", "")
+    return table["solver"] + preset.map(lambda name: f":{name}" if name else "")
+
+
 def row(record: Record) -> dict[str, Any]:
     """Return a run as one flat row; see :func:`runs_frame`."""
     numbers = {name: _number(getattr(record, name)) for name in NUMBERS}

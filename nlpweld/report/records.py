@@ -1,4 +1,4 @@
-"""The stored runs of a study as tables of a report, and what stands beside them: baselines and references."""
+"""What stands beside the records of a study: baselines and references; and what a run maximises, in words."""
 
 import json
 from pathlib import Path
@@ -7,22 +7,7 @@ from typing import Any
 import pandas as pd
 
 from nlpweld.errors import OutputError
-from nlpweld.records.frames import AXES, MEASURES, report_row, runs_frame, study_records, traces_frame
-
-
-def load_records(folder: str | Path) -> pd.DataFrame:
-    """Return the runs of a study, one row each (:func:`~nlpweld.records.frames.runs_frame`), and each one's ``file``.
-
-    Args:
-        folder: the study's folder, with ``records/`` below it.
-
-    Raises:
-        OptionError: the folder holds no records.
-        OutputError: a record is broken, of another version, or was made under other terms than its neighbours.
-    """
-    found = study_records(folder, traces=False)
-    files = [path.relative_to(folder).as_posix() for path, _ in found]
-    return runs_frame((record for _, record in found), file=files)
+from nlpweld.records.frames import AXES, MEASURES, report_row
 
 
 def maximised(row: pd.Series) -> str:
@@ -33,16 +18,6 @@ def maximised(row: pd.Series) -> str:
     if over == "minimum":
         return f"least {what}"
     return f"soft least {what} (p = {row['exponent']:g})" if over == "soft_minimum" else what
-
-
-def load_traces(folder: str | Path) -> pd.DataFrame:
-    """Return every step of every run of a study (:func:`~nlpweld.records.frames.traces_frame`).
-
-    Raises:
-        OptionError: the folder holds no records.
-        OutputError: a record is broken.
-    """
-    return traces_frame(record for _, record in study_records(folder))
 
 
 def load_baselines(folder: str | Path) -> pd.DataFrame:

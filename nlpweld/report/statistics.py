@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlpweld.records.frames import contestants
 from nlpweld.stats import PROBLEM, RUN, SOLVER
 from nlpweld.stats.anytime import anytime
 from nlpweld.stats.intervals import ert, ert_interval, interval, share_interval, shifted_geometric_mean
@@ -65,8 +66,7 @@ class Statistics:
     def judged(self) -> pd.DataFrame:
         """Runs with ``objective``, ``regret`` and the ``label`` of their solver."""
         runs = self.runs.copy()
-        preset = runs["preset"].where(runs["preset"] != "default", "")
-        runs["label"] = runs["solver"] + preset.map(lambda p: f":{p}" if p else "")
+        runs["label"] = contestants(runs)
         return runs.assign(regret=regrets(runs, self.reference))
 
     @cached_property
@@ -153,8 +153,7 @@ def _ranged(name: str, value: float, ends: tuple[float, float]) -> dict[str, flo
 
 def as_text(table: pd.DataFrame) -> pd.DataFrame:
     """Return the table of solvers as strings: value and, where there is one, its 95 % interval."""
-    named = table["solver"] + table["preset"].map(lambda p: "" if p == "default" else f":{p}")
-    text = pd.DataFrame({"problem": table["cell"] + ", " + table["formulation"], "solver": named})
+    text = pd.DataFrame({"problem": table["cell"] + ", " + table["formulation"], "solver": contestants(table)})
     text["runs"] = table["runs"].astype(str)
     for name, (heading, form) in HEADINGS.items():
         text[heading] = [_told(row, name, form) for _, row in table.iterrows()]

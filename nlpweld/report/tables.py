@@ -73,7 +73,7 @@ def summary(runs: pd.DataFrame, baselines: pd.DataFrame, reference: pd.Series | 
     reference, ``regret_percent`` is by how much of it the mean falls short, and stands in place of the distance.
 
     Args:
-        runs: as from :func:`nlpweld.report.records.load_records`.
+        runs: as from :func:`nlpweld.records.frames.runs_frame`.
         baselines: as from :func:`nlpweld.report.records.load_baselines`.
         reference: as from :func:`nlpweld.report.records.load_reference`.
     """

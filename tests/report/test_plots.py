@@ -13,7 +13,6 @@ from nlpweld.report.figures.along_seam import closed
 from nlpweld.report.figures.comparison import best_so_far
 from nlpweld.report.figures.ellipsoids import directions, radius
 from nlpweld.report.plots import drawings, write_plots
-from nlpweld.report.records import load_traces
 from nlpweld.report.study import Study
 from nlpweld.report.style import RC
 
@@ -124,7 +123,7 @@ def test_best_so_far_never_falls_waits_for_the_first_and_believes_no_claim(folde
     add(seed=0, mmr=0.3)
     add(seed=1, mmr=0.2)
     add(seed=2, mmr=9.0, verified=False)
-    steps = load_traces(folder)
+    steps = Study(folder).traces
     steps.loc[(steps["seed"] == 0) & (steps["step"] == 5), "best"] = 0.1
     steps.loc[(steps["seed"] == 0) & (steps["step"] == 6), "best"] = np.nan
     grid, best = best_so_far(steps)

@@ -14,7 +14,7 @@ from nlpweld.errors import OutputError
 from nlpweld.report.figures.comparison import objective_label
 from nlpweld.report.markup import markdown
 from nlpweld.report.plots import drawings, write_plots
-from nlpweld.report.records import load_baselines, load_records, load_reference, load_traces
+from nlpweld.report.records import load_baselines, load_reference
 from nlpweld.report.study import Study
 from nlpweld.report.style import RC
 from nlpweld.report.tables import as_text, format_summary, summary, write_tables
@@ -202,13 +202,13 @@ def test_regret_stands_in_the_table_in_place_of_the_distance(whole):
     assert "regret %" in text
     assert "to C mm" not in text
     assert "| 40.000 |" in text
-    plain = summary(load_records(whole), load_baselines(whole))
+    plain = summary(Study(whole).runs, load_baselines(whole))
     assert "regret_percent" not in plain
     assert any("to C" in column.header for column in format_summary(plain).columns)
 
 
 def test_a_regret_of_nearly_nothing_has_no_sign(whole):
-    table = summary(load_records(whole), load_baselines(whole), pd.Series({DUAL: 0.26 * (1 - 1e-7)}))
+    table = summary(Study(whole).runs, load_baselines(whole), pd.Series({DUAL: 0.26 * (1 - 1e-7)}))
     assert "| 0.000 |" in markdown(as_text(table))
     assert "-0.000" not in markdown(as_text(table))
 
@@ -221,6 +221,6 @@ def test_a_broken_reference_is_named(tmp_path):
 
 
 def test_traces_hold_the_placement_by_name(whole):
-    traces = load_traces(whole)
+    traces = Study(whole).traces
     assert traces.loc[traces["seed"] == 2, "x_m"].tolist() == [0.02] * 4
     assert set(traces["z_m"]) == {0.5}

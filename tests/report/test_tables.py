@@ -8,12 +8,13 @@ from rich.console import Console
 
 from nlpweld.errors import OutputError
 from nlpweld.report.markup import latex, markdown
-from nlpweld.report.records import load_baselines, load_records
+from nlpweld.report.records import load_baselines
+from nlpweld.report.study import Study
 from nlpweld.report.tables import as_text, format_summary, summary, write_tables
 
 
 def rows(folder):
-    return summary(load_records(folder), load_baselines(folder)).set_index(["cell", "solver"])
+    return summary(Study(folder).runs, load_baselines(folder)).set_index(["cell", "solver"])
 
 
 def test_an_unverified_claim_enters_no_mean_and_no_best(folder, add, add_baseline):
@@ -90,7 +91,7 @@ def test_tables_are_written_in_every_form(folder, add, add_baseline):
 
 def test_latex_is_escaped(folder, add):
     add(solver="a_b", preset="50%&#{}~^\\$", cell="x_1")
-    tex = latex(as_text(summary(load_records(folder), load_baselines(folder))))
+    tex = latex(as_text(summary(Study(folder).runs, load_baselines(folder))))
     row = next(line for line in tex.splitlines() if "x\\_1" in line)
     assert r"a\_b:50\%\&\#\{\}\textasciitilde{}\textasciicircum{}\textbackslash{}\$" in row
     body = row.replace(r"\textasciitilde{}", "").replace(r"\textasciicircum{}", "").replace(r"\textbackslash{}", "")
@@ -100,7 +101,7 @@ def test_latex_is_escaped(folder, add):
 def test_a_spread_too_small_to_show_is_not_shown_as_zero(folder, add):
     add(seed=0, mmr=0.29)
     add(seed=1, mmr=0.29 + 1e-9)
-    assert "$\\pm$ $<$1e-5" in latex(as_text(summary(load_records(folder), load_baselines(folder))))
+    assert "$\\pm$ $<$1e-5" in latex(as_text(summary(Study(folder).runs, load_baselines(folder))))
 
 
 @pytest.mark.parametrize("width", [80, 100])
@@ -109,7 +110,7 @@ def test_printed_summary_fits_the_screen(folder, add, add_baseline, width):
     add(solver="random_search", seed=1, evaluations=500_000, solve_s=1234.5)
     add_baseline()
     console = Console(width=width, record=True, quiet=False, file=open("/dev/null", "w"))  # noqa: PTH123, SIM115
-    console.print(format_summary(summary(load_records(folder), load_baselines(folder)), width))
+    console.print(format_summary(summary(Study(folder).runs, load_baselines(folder)), width))
     text = console.export_text()
     console.file.close()
     assert max(map(len, text.splitlines())) <= width
@@ -153,7 +154,7 @@ def test_rows_say_what_they_maximise_where_that_differs(folder, add, add_baselin
 
 def test_older_records_maximise_the_mean(folder, add):
     add(mmr=0.29)
-    runs = load_records(folder)
+    runs = Study(folder).runs
     assert (runs["objective"] == 0.29).all()
     assert (runs["over_seam"] == "mean").all()
 

@@ -7,6 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from nlpweld.records.frames import contestants
 from nlpweld.report import style
 from nlpweld.report.figures import Drawing
 from nlpweld.report.study import Study
@@ -35,8 +36,7 @@ def drawn(study: Study, cell: str, traces: bool) -> pd.DataFrame:
 def labelled(table: pd.DataFrame, cell: str) -> pd.DataFrame:
     """Return the rows of one cell with a ``label``: solver, preset, and formulation where there are several."""
     own = table[table["cell"] == cell].copy()
-    preset = own["preset"].where(own["preset"] != "default", "")
-    own["label"] = own["solver"] + preset.map(lambda p: f":{p}" if p else "")
+    own["label"] = contestants(own)
     if own["formulation"].nunique() > 1:
         own["label"] += "\n" + own["formulation"]
     return own

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from nlpweld.records.frames import contestants
 from nlpweld.report import style
 from nlpweld.report.figures import Drawing
 from nlpweld.report.study import Study
@@ -48,7 +49,7 @@ def reached(study: Study) -> Figure:
 def anytime(study: Study, own: partial, title: str) -> Figure:
     """Draw median and quartiles over seeds of the regret of the best verified answer held at a time."""
     curves = own(study)
-    curves = curves.assign(label=_labels(curves))
+    curves = curves.assign(label=contestants(curves))
     columns = style.columns_for(curves["label"].nunique())
     fig = style.figure(64, columns)
     axes = fig.add_subplot()
@@ -70,11 +71,6 @@ def anytime(study: Study, own: partial, title: str) -> Figure:
 def _own(study: Study, cell: str, formulation: str) -> pd.DataFrame:
     curves = study.statistics.anytime
     return curves[(curves["cell"] == cell) & (curves["formulation"] == formulation)]
-
-
-def _labels(table: pd.DataFrame) -> pd.Series:
-    preset = table["preset"].where(table["preset"] != "default", "")
-    return table["solver"] + preset.map(lambda p: f":{p}" if p else "")
 
 
 def _profile(steps: pd.DataFrame, column: str, x: str, y: str) -> Figure:
