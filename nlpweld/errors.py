@@ -31,3 +31,7 @@ class VerifierError(NlpweldError):
 
 class ReferenceFileError(NlpweldError):
     """A reference file cannot be used, or does not hold for the cell or answer it is held against."""
+
+
+class MotionError(NlpweldError):
+    """A motion cannot be timed: a limit, a displacement or a path is not one that motions have."""

@@ -15,6 +15,7 @@ from nlpweld.cell.cell import Cell
 from nlpweld.cell.complaint import first_complaint, nearest
 from nlpweld.cell.task import Torch
 from nlpweld.errors import OutputError, PlanError
+from nlpweld.timeline import Timeline, timeline_from
 
 FORMAT = "nlpweld-plan"
 VERSION = 1
@@ -38,6 +39,7 @@ class Plan:
         yaw_rad: turn of {P} about z_W [rad].
         freedom: name of a free angle (:func:`free_names`) to its offset from the nominal at the points, shape (N,)
             [rad], linear in s between them; None where the plan takes no freedom, and an angle not named stays nominal.
+        timeline: when everything is where, or None where the plan is not timed.
     """
 
     cell: Cell
@@ -47,6 +49,7 @@ class Plan:
     branches: dict[str, tuple[str, str, str]] | None = None
     yaw_rad: float = 0.0
     freedom: dict[str, np.ndarray] | None = None
+    timeline: Timeline | None = None
 
     @property
     def placement(self) -> np.ndarray:
@@ -57,8 +60,13 @@ class Plan:
         """Return a copy with these offsets of free angles, each of shape (N,) [rad], or with none."""
         return replace(self, freedom=None if freedom is None else dict(freedom))
 
+    def timed(self, timeline: Timeline | None) -> "Plan":
+        """Return a copy with this time axis, or with none."""
+        return replace(self, timeline=timeline)
+
     def to_json(self) -> dict[str, Any]:
         """Return the plan as plain data."""
+        timed = {} if self.timeline is None else {"timeline": self.timeline.to_json()}
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -69,6 +77,7 @@ class Plan:
             "freedom_rad": None if self.freedom is None else {name: u.tolist() for name, u in self.freedom.items()},
             "branches": self.branches and {name: list(branch) for name, branch in self.branches.items()},
             "cell": self.cell.model_dump(mode="json", exclude_unset=True),
+            **timed,
         }
 
     def save(self, path: str | Path) -> Path:
@@ -163,8 +172,10 @@ def _plan_from(data: dict[str, Any]) -> Plan:
         raise ValueError(f"s: {complaint}")
     paths, branches = _paths(data["paths_rad"], cell, len(s)), data.get("branches")
     plan = Plan(cell, placement, s, paths, None if branches is None else _branches(branches, cell), float(yaw))
-    freedom = data.get("freedom_rad")
-    return plan if freedom is None else plan.with_freedom(_freedom(freedom, cell, len(s)))
+    if data.get("freedom_rad") is not None:
+        plan = plan.with_freedom(_freedom(data["freedom_rad"], cell, len(s)))
+    timeline = data.get("timeline")
+    return plan if timeline is None else plan.timed(timeline_from(timeline, joint_counts(cell)))
 
 
 def _paths(value: Any, cell: Cell, points: int) -> dict[str, np.ndarray]:

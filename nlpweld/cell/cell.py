@@ -14,6 +14,7 @@ from nlpweld.cell.robot import Body
 from nlpweld.cell.seams import Composite, Polyline
 from nlpweld.cell.station import Station
 from nlpweld.cell.task import Capsule, Positioner, Posture, Saddle, Tee, Workpiece
+from nlpweld.cell.timing import Timing
 from nlpweld.cell.uncertainty import Uncertainty
 from nlpweld.errors import OptionError
 
@@ -38,6 +39,7 @@ class Cell(Checked):
     objective: Objective
     freedom: Freedom | None = None
     uncertainty: Uncertainty | None = None
+    timing: Timing | None = None
     placements: Annotated[dict[str, Vector], Field(default_factory=dict)]
 
     @model_validator(mode="after")
@@ -109,6 +111,26 @@ class Cell(Checked):
         return self
 
     @model_validator(mode="after")
+    def _torches_wait_somewhere(self) -> "Cell":
+        homes = self.timing.home_deg if self.timing else {}
+        welders = {s.name: s.robot for s in self.stations if s.coupling.kind == "loose"} if homes else {}
+        for name, joints in homes.items():
+            if name not in welders:
+                raise ValueError(f"timing.home_deg.{name}: no welding robot of that name; {nearest(name, welders)}")
+            limits = [(joint.lower_deg, joint.upper_deg) for joint in welders[name].joints]
+            if len(joints) != len(limits):
+                raise ValueError(
+                    f"timing.home_deg.{name}: {len(joints)} numbers for {len(limits)} joints; give one each"
+                )
+            for k, (angle, (low, high)) in enumerate(zip(joints, limits, strict=True), start=1):
+                if not low <= angle <= high:
+                    raise ValueError(f"timing.home_deg.{name}: joint {k} at {angle:g} leaves {low:g} to {high:g} deg")
+        for name in welders:
+            if name not in homes:
+                raise ValueError(f"timing.home_deg: '{name}' has no home; add its joints")
+        return self
+
+    @model_validator(mode="after")
     def _something_is_searched(self) -> "Cell":
         if not self.variables:
             raise ValueError(
@@ -144,8 +166,13 @@ class Cell(Checked):
 
     @property
     def content_hash(self) -> str:
-        """SHA-256 of everything the cell states, sources included, as hexadecimal digits."""
-        held: Any = {"stations": {k: {"layout"} for k, s in enumerate(self.stations) if s.layout is None}}
+        """SHA-256 of everything the placement problem depends on, sources included, as hexadecimal digits.
+
+        Speeds are no part of it: how fast a cell moves changes no placement.
+        """
+        stations = {k: {"robot": {"drives"}} for k in range(len(self.stations))}
+        unstated = {k: {**held, "layout": True} for k, held in stations.items() if self.stations[k].layout is None}
+        held: Any = {"stations": {**stations, **unstated}, "positioner": {"robot": {"drives"}}, "timing": True}
         if self.uncertainty is None:  # like layouts, younger than hashes in stored records
             held["uncertainty"] = True
         return hashlib.sha256(self.model_dump_json(exclude=held).encode()).hexdigest()

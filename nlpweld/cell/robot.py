@@ -22,13 +22,26 @@ class Joint(Checked):
     sign: Literal[-1, 1] = 1
     lower_deg: Finite
     upper_deg: Finite
-    speed_deg_s: Positive | None = None
 
     @model_validator(mode="after")
     def _limits_are_ordered(self) -> "Joint":
         if self.lower_deg >= self.upper_deg:
             raise ValueError(f"lower_deg {self.lower_deg:g} is not below upper_deg {self.upper_deg:g}; swap them")
         return self
+
+
+class Drives(Sourced):
+    """How fast the joints of a robot may move, in their order; a limit that is not stated is not known."""
+
+    speed_deg_s: tuple[Positive, ...]
+    acceleration_deg_s2: tuple[Positive, ...] | None = None
+    jerk_deg_s3: tuple[Positive, ...] | None = None
+
+    @property
+    def stated(self) -> dict[str, tuple[float, ...]]:
+        """The limits that are stated, by the names of their fields."""
+        limits = {name: getattr(self, name) for name in ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")}
+        return {name: values for name, values in limits.items() if values is not None}
 
 
 class End(Checked):
@@ -57,8 +70,18 @@ class Robot(Sourced):
     title: str
     joints: Annotated[tuple[Joint, ...], Field(min_length=1)]
     bodies: tuple[Body, ...] = ()
+    drives: Drives | None = None
     zero_flange_m: Vector
     reach_m: Positive
+
+    @model_validator(mode="after")
+    def _every_joint_has_a_drive(self) -> "Robot":
+        for name, values in (self.drives.stated if self.drives else {}).items():
+            if len(values) != len(self.joints):
+                raise ValueError(
+                    f"drives.{name} has {len(values)} numbers for {len(self.joints)} joints; give one each"
+                )
+        return self
 
     @model_validator(mode="after")
     def _bodies_hang_on_links_there_are(self) -> "Robot":

@@ -17,7 +17,6 @@ d_m = 0.3
 alpha_deg = 0.0
 lower_deg = -90.0
 upper_deg = 120.0
-speed_deg_s = 100.0
 [[joints]]
 a_m = 0.4
 d_m = 0.0
@@ -28,6 +27,9 @@ upper_deg = 150.0
 joints = "drawing"
 zero_flange_m = "drawing"
 reach_m = "drawing"
+[drives]
+speed_deg_s = [100.0, 110.0]
+source = "drawing"
 [[bodies]]
 name = "arm"
 start = { frame = "link0", at_m = [0.0, 0.0, 0.1] }
@@ -49,7 +51,8 @@ BROKEN = [
     ("infinite", "upper_deg = 120.0", "upper_deg = inf", "joints.1.upper_deg: ", "finite"),
     ("negative_reach", "reach_m = 0.9", "reach_m = -0.9", "reach_m: ", "greater than 0"),
     ("negative_radius", "radius_m = 0.05", "radius_m = -0.05", "bodies.arm.radius_m: ", "greater than 0"),
-    ("negative_speed", "speed_deg_s = 100.0", "speed_deg_s = -100.0", "joints.1.speed_deg_s: ", "greater than 0"),
+    ("negative_speed", "[100.0, 110.0]", "[-100.0, 110.0]", "drives.speed_deg_s.1: ", "greater than 0"),
+    ("speed_of_one_joint", "[100.0, 110.0]", "[100.0]", "drives.speed_deg_s", "1 numbers for 2 joints"),
     ("sign_of_two", "a_m = 0.5", "a_m = 0.5\nsign = 2", "joints.1.sign: ", "got 2"),
     ("truth_for_number", "a_m = 0.5", "a_m = true", "joints.1.a_m: ", "valid number"),
     ("text_for_number", "a_m = 0.5", 'a_m = "0.5"', "joints.1.a_m: ", "valid number"),

@@ -172,9 +172,11 @@ def test_lopsided_limits_fall_on_the_right_side(name: str, number: int, expected
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_speeds_are_stated_for_all_joints_except_on_the_er16(name: str) -> None:
-    known = [joint.speed_deg_s is not None for joint in load_robot(name).joints]
-    assert known == [name != "er16_1600"] * 6
+def test_speeds_are_stated_for_all_joints_and_accelerations_where_a_maker_does(name: str) -> None:
+    drives = load_robot(name).drives
+    assert drives is not None
+    assert len(drives.speed_deg_s) == 6
+    assert (drives.acceleration_deg_s2 is not None) == (name in ("er16_1600", "er20_1780_a6"))
 
 
 def holds_number_at_any_depth(value: Any) -> bool:
@@ -195,7 +197,8 @@ def unsourced(table: Sourced, own_tables: tuple[str, ...] = ()) -> list[str]:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_number_has_a_source(name: str) -> None:
     robot = load_robot(name)
-    assert unsourced(robot, own_tables=("bodies",)) == []
+    assert unsourced(robot, own_tables=("bodies", "drives")) == []
+    assert unsourced(robot.drives) == []
     assert [unsourced(body) for body in robot.bodies] == [[]] * len(robot.bodies)
 
 
