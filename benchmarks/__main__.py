@@ -6,5 +6,11 @@ Each part has a process of its own, so that the memory one takes does not count 
 import subprocess
 import sys
 
-for part in ("benchmarks.ratios", "benchmarks.scaling", "benchmarks.forms", "benchmarks.studies"):
+for part in (
+    "benchmarks.ratios",
+    "benchmarks.scaling",
+    "benchmarks.forms",
+    "benchmarks.studies",
+    "benchmarks.s_curves",
+):
     subprocess.run([sys.executable, "-m", part], check=True)
