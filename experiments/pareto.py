@@ -1,4 +1,4 @@
-"""More than one aim: fronts of the objective against clearance, least manipulability and joint travel, two ways.
+"""More than one aim: fronts of the objective against clearance, least manipulability, joint travel and time, two ways.
 
     python experiments/pareto.py --out results/pareto
 

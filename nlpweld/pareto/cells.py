@@ -13,7 +13,7 @@ from nlpweld.formulation.nlp import Nlp
 from nlpweld.formulation.reduced import reduced
 from nlpweld.pareto.aims import Aim, Meter, verified_value
 from nlpweld.pareto.front import non_dominated
-from nlpweld.pareto.limited import Second, at_least, less_travel
+from nlpweld.pareto.limited import Second, at_least, less
 from nlpweld.pareto.nsga import nsga
 from nlpweld.pareto.sweep import Found, farthest, sweep, verified
 from nlpweld.plan import Plan
@@ -21,7 +21,7 @@ from nlpweld.verify import Report
 
 ENGINE = "numpy"  # every level makes a cell of its own, which Numba would compile anew
 LAST = 0.99  # of the way to the other end: from there on what is feasible is too thin for penalties
-STILL = 1e-5  # [m], [m^3] or [rad]; differences of a second value below it are the arithmetic's
+STILL = 1e-5  # [m], [m^3], [rad] or [s]; differences of a second value below it are the arithmetic's
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Trade:
                 good part of itself, which penalties must outweigh.
         """
         if self.aim.level is None:
-            return at_least(self.nlp, less_travel(self.batch), level, span / 4)
+            return at_least(self.nlp, less(self.batch, self.aim), level, span / 4)
         return reduced(self.cell.with_(constraints={self.aim.level: level - self.margin}), ENGINE)
 
     @property

@@ -1,4 +1,4 @@
-"""A problem that must also keep a level of something its cell has no level of: joint travel, or a toy's second aim."""
+"""A problem that must also keep a level of something its cell has no level of: joint travel, time, or a toy's aim."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from nlpweld.cell import Cell
 from nlpweld.formulation.batch import Batch
 from nlpweld.formulation.derivatives import by_casadi
 from nlpweld.formulation.nlp import Evaluation, Nlp, Relaxation
 from nlpweld.kinematics.ik import signs
-from nlpweld.pareto.aims import AIMS, Meter
+from nlpweld.pareto.aims import Aim, Meter, speeds_rad_s, turning_s
 
 BLUNT_RAD = 0.3  # over the sharpness: below such a step |dq| is round
+STEP_S = 1.0  # over the sharpness: joints whose steps take times this near to each other share the maximum
 
 Second = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of candidates (m, d) on modes (m,), shape (m,); maximised
 
@@ -78,29 +80,43 @@ def _with_penalty(base: Relaxation, side: Relaxation, level: float, unit: float)
     return Relaxation(*(ca.Function(name, [x, s], [out], names, [name]) for name, out in outputs.items()))
 
 
-def less_travel(batch: Batch) -> Side:
-    """Return minus the joint travel of a cell's reduced form, with derivatives.
+def less(batch: Batch, aim: Aim) -> Side:
+    """Return minus the joint travel of a cell's reduced form, or minus the time of its quickest pass, with derivatives.
 
-    Smoothly it is ``sum sqrt(dq^2 + (blunt/s)^2)`` over stations, joints and neighbouring points, never less than the
-    travel itself; s is the sharpness.
+    Smoothly a step from point to point is ``sqrt(dq^2 + (blunt/s)^2)``, s being the sharpness. Travel sums these over
+    stations and joints; a pass takes the log-sum-exp, in units of ``STEP_S / s``, of these over joint speeds. Both are
+    never less than the exact ones.
     """
-    meter = Meter(batch, AIMS["travel_rad"])
-    return Side("travel", lambda X, mode: -meter(X, mode), lambda mode: _smooth_travel(batch, mode))
+    meter, total = Meter(batch, aim), _travel if aim.name == "travel_rad" else _pass_s
+    return Side(aim.name, lambda X, mode: -meter(X, mode), lambda mode: _over_seam(batch, mode, total))
 
 
-def _smooth_travel(batch: Batch, mode: int) -> Relaxation:
-    """Return the sum over neighbouring seam points of what joints turn between them."""
-    count, points = len(batch.points), batch.points
-    x, both, s = ca.SX.sym("x", len(batch.cell.variables)), ca.SX.sym("points", 2 * count), ca.SX.sym("sharpness")
-    travel = ca.SX(0)
+Total = Callable[[Cell, list[ca.SX], ca.SX, ca.SX], ca.SX]  # cell, steps [rad], the positioner's [s], sharpness
+
+
+def _travel(cell: Cell, steps: list[ca.SX], turning_s: ca.SX, s: ca.SX) -> ca.SX:
+    return ca.sum1(ca.vertcat(*steps))
+
+
+def _pass_s(cell: Cell, steps: list[ca.SX], turning_s: ca.SX, s: ca.SX) -> ca.SX:
+    taken = [step / ca.DM(speeds_rad_s(station.robot)) for station, step in zip(cell.stations, steps, strict=True)]
+    return ca.logsumexp(ca.vertcat(*taken, turning_s) * (s / STEP_S)) * (STEP_S / s)
+
+
+def _over_seam(batch: Batch, mode: int, total: Total) -> Relaxation:
+    """Return the sum over neighbouring seam points of a total of what joints turn between them."""
+    count, points, cell = len(batch.points), batch.points, batch.cell
+    x, both, s = ca.SX.sym("x", len(cell.variables)), ca.SX.sym("both", 2 * count + 1), ca.SX.sym("sharpness")
+    steps = []
     for grip, branch in zip(batch.stage.grips, batch.modes[mode], strict=True):
         side = ca.DM(signs((*branch, "noflip")))
-        here, there = (grip(x, point, side)[0] for point in ca.vertsplit(both, count))
+        here, there = (grip(x, point, side)[0] for point in (both[:count], both[count:-1]))
         cos = ca.sum2(here * there)
         sin = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
-        travel += ca.sum1(ca.sqrt(ca.atan2(sin, cos) ** 2 + (BLUNT_RAD / s) ** 2))
-    pairs = np.vstack([points, np.roll(points, -1, axis=1)])
+        steps.append(ca.sqrt(ca.atan2(sin, cos) ** 2 + (BLUNT_RAD / s) ** 2))
+    value = total(cell, steps, both[-1], s)
+    pairs = np.vstack([points, np.roll(points, -1, axis=1)])[:, : None if cell.seam.closed else -1]
     return by_casadi(
-        ca.Function("travel", [x, both, s], [travel], ["x", "points", "sharpness"], ["travel"], {"cse": True}),
-        pairs if batch.cell.seam.closed else pairs[:, :-1],
+        ca.Function("less", [x, both, s], [value], ["x", "points", "sharpness"], ["less"], {"cse": True}),
+        np.vstack([pairs, turning_s(cell).T]),
     )

@@ -62,6 +62,7 @@ def test_both_fronts_are_not_dominated_and_close(name: str, swept: dict, evolved
 
 def test_front_is_one_point_where_the_optimum_is_best_in_both(swept: dict) -> None:
     assert len(swept["clearance_m"].points) == 1  # the torch keeps its distance from the work wherever it stands
+    assert len(swept["quickest_s"].points) == 1  # and the rotator is slower than any joint of the robot
 
 
 def test_same_seed_same_front(trades: dict) -> None:
