@@ -2,9 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 from rich.console import Console
 
@@ -14,6 +15,7 @@ from nlpweld.bench.run import run
 from nlpweld.bench.study import load_study
 from nlpweld.errors import NlpweldError
 from nlpweld.records.model import Record
+from nlpweld.report.markup import markdown
 from nlpweld.report.tables import format_summary
 
 STUDIES = Path(__file__).parent / "studies"
@@ -37,10 +39,35 @@ def work(steps: Iterable[Step], watch: StudyProgress, name: str) -> None:
     watch.bar.update(bar, description=name)
 
 
+def rounded(table: pd.DataFrame, digits: Mapping[str, int]) -> str:
+    """Return a table in Markdown, numbers of the named columns with so many digits, blank where there is none."""
+    shown = table.astype(object).where(table.notna(), "")
+    for name, places in digits.items():
+        shown[name] = [f"{v:z.{places}f}" if np.isfinite(v) else "" for v in table[name].astype(float)]
+    return markdown(shown)
+
+
+def arguments(doc: str, out: str) -> argparse.ArgumentParser:
+    """Return a parser with the options that every study has."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path(out), help="folder of the study")
+    return parser
+
+
+def told(parser: argparse.ArgumentParser, study: Callable[[argparse.Namespace, Console], str]) -> int:
+    """Run a study and print what it returns: 0 when done, 2 when it cannot be."""
+    options, console = parser.parse_args(), Console(stderr=True)
+    try:
+        print(study(options, console))
+    except NlpweldError as error:
+        console.print(f"error: {error}", markup=False, highlight=False)
+        return 2
+    return 0
+
+
 def main(study: Study, doc: str, out: str) -> int:
     """Run a study from the command line: 0 when done, 2 when it cannot be."""
-    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(out), help="folder of the study")
+    parser = arguments(doc, out)
     parser.add_argument("--workers", type=int, default=2, help="runs at once")
     parser.add_argument("--quick", action="store_true", help="few seeds, coarse grids: to see that it works")
     parser.add_argument("--no-figures", action="store_true", help="stop after data and tables")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from common import main, solved
+from common import main, rounded, solved
 from rich.console import Console
 
 from nlpweld.bench.progress import StudyProgress
@@ -58,13 +58,8 @@ def _row(runs: list[Record]) -> dict[str, Any]:
 
 def markdown(table: pd.DataFrame) -> str:
     """Return the table in Markdown."""
-    shown = table.copy()
     digits = {"mmr_mean": 5, "mmr_min": 5, "gain_percent": 1, "joint_step_deg": 2, "solve_s": 2, "build_s": 2}
-    for name, places in digits.items():
-        shown[name] = [f"{v:.{places}f}" if np.isfinite(v) else "" for v in table[name]]
-    shown["found"] = ["" if pd.isna(v) else f"{v:.0f}" for v in table.found]
-    lines = ["| " + " | ".join(shown.columns) + " |", "|" + "---|" * len(shown.columns)]
-    return "\n".join([*lines, *("| " + " | ".join(map(str, row)) + " |" for row in shown.to_numpy())]) + "\n"
+    return rounded(table, {**digits, "found": 0})
 
 
 def study(options: Namespace, console: Console) -> pd.DataFrame:

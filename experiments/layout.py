@@ -6,7 +6,6 @@ What the folder already holds is not run again. Table and figures are drawn from
 and so is the placement, everything may be shifted together, so that where they end is one layout of many.
 """
 
-import argparse
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from common import arguments, rounded, told
 from layout_figure import draw
 from matplotlib import rc_context
 from rich.console import Console
@@ -23,7 +23,6 @@ from nlpweld.bench.progress import StudyProgress
 from nlpweld.bench.run import grid, run
 from nlpweld.bench.task import Task
 from nlpweld.cell import Cell, load_cell
-from nlpweld.errors import NlpweldError
 from nlpweld.plan import write_text
 from nlpweld.records.model import Record
 from nlpweld.report.style import RC
@@ -147,13 +146,8 @@ def moves(cell: Cell, record: Record) -> str:
 
 def markdown(table: pd.DataFrame) -> str:
     """Return the table in Markdown."""
-    shown = table.copy()
     digits = {"mmr_mean": 5, "mmr_min": 5, "gain_percent": 1, "solve_s": 2, "build_s": 2, "found": 0}
-    for name, places in digits.items():
-        shown[name] = [f"{v:.{places}f}" if np.isfinite(v) else "" for v in table[name].astype(float)]
-    shown["moves"] = table.moves.fillna("")
-    lines = ["| " + " | ".join(shown.columns) + " |", "|" + "---|" * len(shown.columns)]
-    return "\n".join([*lines, *("| " + " | ".join(map(str, row)) + " |" for row in shown.to_numpy())]) + "\n"
+    return rounded(table, digits)
 
 
 def study(
@@ -187,20 +181,13 @@ def _figures(folder: Path, cases: tuple[Case, ...], records: list[Record]) -> No
                 draw(load_cell(name), before, after, HALF_M).savefig(folder / "figures" / f"layout_{name}.png")
 
 
-def main() -> None:
+def main() -> int:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("results/layout"), help="folder of the study")
+    parser = arguments(__doc__, "results/layout")
     parser.add_argument("--seeds", type=int, default=6, help="starts of every case")
     parser.add_argument("--workers", type=int, default=1, help="runs at once; times want one")
-    chosen = parser.parse_args()
-    console = Console(stderr=True)
-    try:
-        print(markdown(study(chosen.out, chosen.seeds, chosen.workers, console)))
-    except NlpweldError as error:
-        console.print(f"error: {error}", markup=False, highlight=False)
-        sys.exit(2)
+    return told(parser, lambda chosen, console: markdown(study(chosen.out, chosen.seeds, chosen.workers, console)))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from common import arguments, rounded, told
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -22,7 +23,6 @@ from rich.console import Console
 from rich.progress import Progress
 
 from nlpweld.cell import Cell, load_cell
-from nlpweld.errors import NlpweldError
 from nlpweld.pareto.aims import AIMS, Aim
 from nlpweld.pareto.cells import Front, Trade, by_nsga, by_sweep
 from nlpweld.pareto.front import dominated, hypervolumes
@@ -123,12 +123,7 @@ def _ends(front: Front, best: float) -> dict[str, float]:
 
 def markdown(table: pd.DataFrame) -> str:
     """Return the table of fronts in Markdown."""
-    shown = table.copy()
-    for name, digits in COLUMNS.items():
-        if digits is not None:
-            shown[name] = [f"{v:.{digits}f}" if np.isfinite(v) else "" for v in table[name].astype(float)]
-    lines = ["| " + " | ".join(shown.columns) + " |", "|" + "---|" * len(shown.columns)]
-    return "\n".join([*lines, *("| " + " | ".join(map(str, row)) + " |" for row in shown.to_numpy())]) + "\n"
+    return rounded(table, {name: digits for name, digits in COLUMNS.items() if digits is not None})
 
 
 def draw(points: pd.DataFrame) -> Figure:
@@ -178,24 +173,21 @@ def study(folder: Path, cells: list[Cell], effort: Effort, console: Console, fig
     return table
 
 
-def main() -> None:
+def main() -> int:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("results/pareto"), help="folder of the study")
+    parser = arguments(__doc__, "results/pareto")
     parser.add_argument("--cells", nargs="+", default=list(CELLS), help="names or files of cells")
     parser.add_argument("--levels", type=int, default=Effort.levels, help="answers of a sweep")
     parser.add_argument("--population", type=int, default=Effort.population, help="individuals of NSGA-II")
     parser.add_argument("--generations", type=int, default=Effort.generations, help="generations of NSGA-II")
     parser.add_argument("--seed", type=int, default=Effort.seed, help="seed of both methods")
-    chosen = parser.parse_args()
-    console = Console(stderr=True)
-    effort = Effort(chosen.levels, chosen.population, chosen.generations, chosen.seed)
-    try:
-        print(markdown(study(chosen.out, [load_cell(name) for name in chosen.cells], effort, console)))
-    except NlpweldError as error:
-        console.print(f"error: {error}", markup=False, highlight=False)
-        sys.exit(2)
+
+    def run(chosen: argparse.Namespace, console: Console) -> str:
+        effort = Effort(chosen.levels, chosen.population, chosen.generations, chosen.seed)
+        return markdown(study(chosen.out, [load_cell(name) for name in chosen.cells], effort, console))
+
+    return told(parser, run)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -7,7 +7,6 @@ optimum by every objective, in percent of the best that was found for that one: 
 question. What the folder already holds is not run again; tables and figure are drawn from its records.
 """
 
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from common import arguments, told
 from rich.console import Console
 
 from nlpweld.bench.answer import evaluate
@@ -24,7 +24,6 @@ from nlpweld.bench.run import grid, run
 from nlpweld.bench.task import Task
 from nlpweld.cell import Cell, load_cell
 from nlpweld.cell.cell import VARIABLES
-from nlpweld.errors import NlpweldError
 from nlpweld.plan import write_text
 from nlpweld.records.model import Record
 from nlpweld.report.figures.readings import drawings
@@ -207,20 +206,13 @@ def study(folder: Path, seeds: int, workers: int, console: Console, **which: Any
     return optima, cross
 
 
-def main() -> None:
+def main() -> int:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("results/readings"), help="folder of the study")
+    parser = arguments(__doc__, "results/readings")
     parser.add_argument("--seeds", type=int, default=3, help="starts of Ipopt for every objective")
     parser.add_argument("--workers", type=int, default=1, help="runs at once")
-    chosen = parser.parse_args()
-    console = Console(stderr=True)
-    try:
-        print(markdown(*study(chosen.out, chosen.seeds, chosen.workers, console)))
-    except NlpweldError as error:
-        console.print(f"error: {error}", markup=False, highlight=False)
-        sys.exit(2)
+    return told(parser, lambda chosen, console: markdown(*study(chosen.out, chosen.seeds, chosen.workers, console)))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

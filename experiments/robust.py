@@ -6,7 +6,6 @@ Fixture and bases may be off by a stated box, by twice and by four times as much
 these errors, and the robust form is solved by Ipopt and by the GA. What the folder already holds is not run again.
 """
 
-import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from common import arguments, rounded, told
 from rich.console import Console
 
 from nlpweld.bench.answer import evaluate_plan, formulate
@@ -24,7 +24,6 @@ from nlpweld.bench.run import grid, run
 from nlpweld.bench.task import Task
 from nlpweld.cell import Cell, load_cell
 from nlpweld.cell.uncertainty import NOMINAL
-from nlpweld.errors import NlpweldError
 from nlpweld.plan import write_text
 from nlpweld.report.figures.robust import drawings
 from nlpweld.report.plots import write
@@ -150,13 +149,9 @@ def robust_table(
 
 def markdown(table: pd.DataFrame) -> str:
     """Return the table in Markdown."""
-    shown = table.drop(columns=["floor_m3", "where_w_is_least"])
     digits = {"objective": 5, "objective_worst": 5, "w_worst_m3": 5, "clearance_worst_mm": 2, "solve_s": 2}
     digits |= {"errors": 0, "evaluations": 0, "x_m": 4, "y_m": 4, "z_m": 4}
-    for name, places in digits.items():
-        shown[name] = [f"{v:.{places}f}" for v in table[name] + 0.0]
-    lines = ["| " + " | ".join(shown.columns) + " |", "|" + "---|" * len(shown.columns)]
-    return "\n".join([*lines, *("| " + " | ".join(map(str, r)) + " |" for r in shown.to_numpy())]) + "\n"
+    return rounded(table.drop(columns=["floor_m3", "where_w_is_least"]), digits)
 
 
 def solved(todo: list[Task], folder: Path, workers: int, watch: StudyProgress) -> list[Record]:
@@ -190,19 +185,13 @@ def study(
     return table
 
 
-def main() -> None:
+def main() -> int:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("results/robust"), help="folder of the study")
+    parser = arguments(__doc__, "results/robust")
     parser.add_argument("--workers", type=int, default=1, help="runs at once; times want one")
-    chosen = parser.parse_args()
-    console = Console(stderr=True)
-    try:
-        print(markdown(study(chosen.out, chosen.workers, console, [load_cell(name) for name in CELLS])))
-    except NlpweldError as error:
-        console.print(f"error: {error}", markup=False, highlight=False)
-        sys.exit(2)
+    cells = [load_cell(name) for name in CELLS]
+    return told(parser, lambda chosen, console: markdown(study(chosen.out, chosen.workers, console, cells)))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
