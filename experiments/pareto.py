@@ -145,7 +145,7 @@ def draw(points: pd.DataFrame) -> Figure:
         if alone:  # differences of two such points are the arithmetic's
             axes.set_xlim(0.5 * own.value.max(), 1.5 * own.value.max())
             axes.set_ylim(0.9 * own.objective.max(), 1.1 * own.objective.max())
-        axes.xaxis.set_major_locator(MaxNLocator(4))
+        axes.xaxis.set_major_locator(MaxNLocator(3))
     fig.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return fig
 
