@@ -5,7 +5,7 @@ RUN := $(VENV)/bin/python
 # no compiler, no licence: everything comes as wheels, at the versions in constraints.txt
 INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: reproduce test lint bench clean
+.PHONY: reproduce test lint bench paper clean
 
 reproduce: $(VENV)/.stamp-main
 	$(RUN) experiments/reproduce_paper.py
@@ -19,6 +19,10 @@ lint: $(VENV)/.stamp-lint
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 	$(VENV)/bin/lint-imports
+
+# paper/nlpweld.pdf, from what results/ holds; the studies' LaTeX tables stay in results/*/tables
+paper: $(VENV)/.stamp-paper
+	$(RUN) paper/build.py
 
 bench: $(VENV)/.stamp-bench
 	$(RUN) -m benchmarks
@@ -34,6 +38,10 @@ $(VENV)/.stamp-test: $(VENV)/.stamp-main
 
 $(VENV)/.stamp-lint: $(VENV)/.stamp-main
 	$(INSTALL) --editable '.[test,fast,lint]'
+	touch $@
+
+$(VENV)/.stamp-paper: $(VENV)/.stamp-main
+	$(INSTALL) --editable '.[paper]'
 	touch $@
 
 $(VENV)/.stamp-bench: $(VENV)/.stamp-main

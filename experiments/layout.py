@@ -6,6 +6,7 @@ What the folder already holds is not run again. Table and figures are drawn from
 and so is the placement, everything may be shifted together, so that where they end is one layout of many.
 """
 
+import json
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -164,6 +165,7 @@ def study(
         records = run(todo, folder, Local(workers), watch)
     write_tables(folder)
     table = layout_table(cases, records)
+    write_text(folder / "data" / "box.json", json.dumps({"half_m": HALF_M, "half_deg": HALF_DEG}, indent=1) + "\n")
     write_text(folder / "tables" / "layout.csv", table.to_csv(index=False, float_format="%.6g"))
     write_text(folder / "tables" / "layout.md", markdown(table))
     _figures(folder, cases, records)

@@ -178,6 +178,7 @@ def study(
             return report
 
         table = robust_table(cells, list(seeds), records, nominal)
+    write_text(folder / "data" / "box.json", json.dumps({**BOX, "source": SOURCE}, indent=1) + "\n")
     write_text(folder / "data" / "robust.csv", table.to_csv(index=False, float_format="%.6g"))
     write_text(folder / "tables" / "robust.md", markdown(table))
     for drawing in drawings(Study(folder)):

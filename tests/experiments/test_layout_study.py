@@ -1,5 +1,6 @@
 """The layout study: what its cases free, gains over bases that are held, and a small study from end to end."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from rich.console import Console
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "experiments"))
 
-from layout import Case, freed, layout_table, markdown, moves, study, tasks
+from layout import HALF_DEG, HALF_M, Case, freed, layout_table, markdown, moves, study, tasks
 
 from nlpweld.bench import engines
 from nlpweld.cell import load_cell
@@ -76,3 +77,4 @@ def test_small_study_is_verified_draws_and_resumes(tmp_path: Path) -> None:
     study(tmp_path, 1, 1, Console(quiet=True), cases, points=18)
     assert [path.stat().st_mtime_ns for path in sorted((tmp_path / "records").rglob("*.json"))] == before
     assert (tmp_path / "tables" / "layout.md").read_text().count("\n") == 4
+    assert json.loads((tmp_path / "data" / "box.json").read_text()) == {"half_m": HALF_M, "half_deg": HALF_DEG}

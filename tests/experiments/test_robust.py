@@ -1,5 +1,6 @@
 """The robust study: rows of stated, nominal and robust answers, and the figure drawn from them."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -85,3 +86,4 @@ def test_study_writes_table_and_figure_and_asks_for_a_nominal_report_once(tmp_pa
     assert asked == ["robust"]
     assert (tmp_path / "figures" / "robust.png").stat().st_size > 10_000
     assert (tmp_path / "tables" / "robust.md").read_text().count("\n") == 6
+    assert json.loads((tmp_path / "data" / "box.json").read_text()).items() >= experiment.BOX.items()
