@@ -5,7 +5,7 @@ RUN := $(VENV)/bin/python
 # no compiler, no licence: everything comes as wheels, at the versions in constraints.txt
 INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: reproduce test lint bench paper clean
+.PHONY: reproduce test lint bench docs paper clean
 
 reproduce: $(VENV)/.stamp-main
 	$(RUN) experiments/reproduce_paper.py
@@ -26,6 +26,9 @@ paper: $(VENV)/.stamp-paper
 
 bench: $(VENV)/.stamp-bench
 	$(RUN) -m benchmarks
+
+docs: $(VENV)/.stamp-docs
+	$(RUN) -m sphinx --fail-on-warning --keep-going --quiet -b html docs docs/_build
 
 $(VENV)/.stamp-main: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -48,5 +51,9 @@ $(VENV)/.stamp-bench: $(VENV)/.stamp-main
 	$(INSTALL) --editable '.[fast,bench]'
 	touch $@
 
+$(VENV)/.stamp-docs: $(VENV)/.stamp-main
+	$(INSTALL) --editable '.[docs]'
+	touch $@
+
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) docs/_build docs/_generated .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from nlpweld.bench.compare import compare
     from nlpweld.cell import Cell, load_cell, load_positioner, load_robot
     from nlpweld.errors import NlpweldError
+    from nlpweld.export import export_plan
     from nlpweld.formulation.full import full, full_start
     from nlpweld.formulation.full_redundant import full_redundant
     from nlpweld.formulation.reduced import reduced
@@ -33,6 +34,7 @@ _HOMES = {
     "Report": "verify",
     "compare": "bench.compare",
     "evaluate": "bench.answer",
+    "export_plan": "export",
     "formulate": "bench.answer",
     "full": "formulation.full",
     "full_redundant": "formulation.full_redundant",
@@ -59,6 +61,7 @@ __all__ = [
     "Report",
     "compare",
     "evaluate",
+    "export_plan",
     "formulate",
     "full",
     "full_redundant",

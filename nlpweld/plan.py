@@ -15,6 +15,7 @@ from nlpweld.cell.cell import Cell
 from nlpweld.cell.complaint import first_complaint, nearest
 from nlpweld.cell.task import Torch
 from nlpweld.errors import OutputError, PlanError
+from nlpweld.html_table import html_table
 from nlpweld.timeline import Timeline, timeline_from
 
 FORMAT = "nlpweld-plan"
@@ -63,6 +64,18 @@ class Plan:
     def timed(self, timeline: Timeline | None) -> "Plan":
         """Return a copy with this time axis, or with none."""
         return replace(self, timeline=timeline)
+
+    def _repr_html_(self) -> str:
+        """Show in a notebook what each joint turns through [deg], in DH direction."""
+        rows = []
+        for name, q in self.paths.items():
+            spans = [f"{low:.1f} to {high:.1f}" for low, high in np.degrees([q.min(axis=0), q.max(axis=0)]).T]
+            branch = "-".join((self.branches or {}).get(name, ("",)))
+            rows.append((name, branch, ", ".join(spans)))
+        at = ", ".join(f"{x:.4f}" for x in self.placement_m)
+        timed = f", {self.timeline.duration_s:.2f} s" if self.timeline else ", not timed"
+        title = f"plan of {self.cell.name} at ({at}) m, {len(self.s)} points{timed}"
+        return html_table(title, rows, ("", "branch", "joints along the seam [deg]"))
 
     def to_json(self) -> dict[str, Any]:
         """Return the plan as plain data."""

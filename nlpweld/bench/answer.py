@@ -17,6 +17,7 @@ from nlpweld.formulation.nlp import Nlp
 from nlpweld.formulation.reduced import OutOfReach, reduced
 from nlpweld.formulation.redundant import REDUNDANT, redundant
 from nlpweld.formulation.robust import ROBUST, robust
+from nlpweld.html_table import html_table
 from nlpweld.plan import Plan
 from nlpweld.solvers import Budget, Outcome, Solver, make_solver
 from nlpweld.verify import Report, verify, verify_robust
@@ -49,6 +50,15 @@ class Answer:
     def verified(self) -> bool:
         """Whether the verifier found the answer feasible along the whole seam."""
         return self.report is not None and self.report.feasible
+
+    def _repr_html_(self) -> str:
+        """Show in a notebook what the solver claims, then what the verifier found."""
+        claim = self.outcome
+        rows = [("claimed", f"{claim.status} ({claim.message})"), ("evaluations", f"{claim.evaluations:,}")]
+        rows.append(("time", f"build {claim.build_s:.2f} s, solve {claim.solve_s:.2f} s"))
+        found = "no answer to verify" if self.report is None else "verified" if self.verified else "NOT verified"
+        own = html_table(f"answer: {found}", rows)
+        return own if self.report is None else own + self.report._repr_html_()
 
 
 def formulate(cell: Cell, formulation: str = "reduced", engine: str = "auto") -> Nlp:

@@ -17,6 +17,7 @@ from nlpweld.cell.task import Capsule, Positioner, Posture, Saddle, Tee, Workpie
 from nlpweld.cell.timing import Timing
 from nlpweld.cell.uncertainty import Uncertainty
 from nlpweld.errors import OptionError
+from nlpweld.html_table import html_table
 
 VARIABLES = ("x_m", "y_m", "z_m", "yaw_rad")
 Seam = Annotated[Saddle | Composite | Polyline, Field(discriminator="curve")]
@@ -163,6 +164,16 @@ class Cell(Checked):
         for table, fields in tables.items():
             data[table] = {**(data.get(table) or {}), **fields}
         return Cell.model_validate(data)
+
+    def _repr_html_(self) -> str:
+        """Show in a notebook who does what, and what is searched."""
+        rows = [(s.name, f"{s.robot.title}, {s.coupling.kind}", str(s.base_position_m)) for s in self.stations]
+        if self.positioner:
+            rows.append((self.positioner.name, f"{self.positioner.robot.title}, holds the work", ""))
+        rows.append(("seam", f"{self.seam.curve}, {self.seam.points} points", "closed" if self.seam.closed else "open"))
+        bounds = ", ".join(f"[{low:g}, {high:g}]" for low, high in self.box.T)
+        rows.append(("searched", ", ".join(self.variables), bounds))
+        return html_table(f"{self.name}: {self.title}", rows, ("", "what", "base in W [m], or bounds"))
 
     @property
     def content_hash(self) -> str:

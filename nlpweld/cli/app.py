@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from nlpweld.cli import ask, judge, look, study
+from nlpweld.cli import export as export_
 from nlpweld.errors import OptionError
 
 app = typer.Typer(
@@ -154,3 +155,19 @@ def plots(folder: Annotated[Path, typer.Argument(metavar="DIR")], json: Json = F
 def report(folder: Annotated[Path, typer.Argument(metavar="DIR")], json: Json = False) -> None:
     """Write one page of a study's tables and figures, from its stored records."""
     study.report(folder, json)
+
+
+@app.command()
+def export(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a timed plan file")],
+    format: Annotated[str, typer.Option(metavar="NAME", help="csv, ros2, ros2-json, rapid or krl")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="folder for the files")],
+    force: Annotated[bool, typer.Option("--force", help="replace files that exist")] = False,
+    every: Annotated[
+        float | None,
+        typer.Option(help="longest step between points [s]; as few points as keep within 0.01 deg by default"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a timed plan as joint sequences for controllers."""
+    export_.export(plan, format, out, force, every, json)

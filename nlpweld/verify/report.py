@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from nlpweld.cell import Cell
+from nlpweld.html_table import html_table
 from nlpweld.verify.worst_case import WorstCase
 
 # An excess of this size [in the constraint's own unit] counts as equally bad; constraints not named come first.
@@ -212,6 +213,18 @@ class Report:
             lines += textwrap.wrap(str(violation), WIDTH, initial_indent="  - ", subsequent_indent="      ")
         more = len(self.violations) - SHOWN
         return "\n".join([*lines, f"  - and {more} more"] if more > 0 else lines)
+
+    def _repr_html_(self) -> str:
+        """Show in a notebook the verdict, what was measured, and what is broken."""
+        label = f"{WHOLE.get(self.reading, f'MMR ({self.reading})')} {self.unit}"
+        rows = [(label, self.mmr_mean, self.mmr_min, self.mmr_min_along)]
+        for name, mean in self.manipulability_mean.items():
+            rows.append((f"w of {name} [m^3]", mean, self.manipulability_min[name], self.singularity_min[name]))
+        rows.append(("clearance [mm]", math.nan, 1e3 * self.clearance_m, 1e3 * self.clearance_along_m))
+        rows.append(("joint margin [deg]", math.nan, math.nan, math.degrees(self.joint_margin_rad)))
+        shown = [(row[0], *("" if math.isnan(x) else f"{x:.6g}" for x in row[1:])) for row in rows]
+        table = html_table(" ".join(self._headline()), shown, ("", "mean", "least at points", "along the seam"))
+        return table + (html_table("violations", [(str(v),) for v in self.violations]) if self.violations else "")
 
     def _headline(self) -> list[str]:
         at = ", ".join(f"{x:.4g}" for x in self.at)
