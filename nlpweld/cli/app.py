@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from nlpweld.cli import ask, judge, look, study
+from nlpweld.cli import ask, judge, look, simulation, study
 from nlpweld.cli import export as export_
 from nlpweld.errors import OptionError
 
@@ -171,3 +171,20 @@ def export(
 ) -> None:
     """Write a timed plan as joint sequences for controllers."""
     export_.export(plan, format, out, force, every, json)
+
+
+@app.command()
+def sim(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a timed plan file; see 'nlpweld time'")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="keep report, time series, figures and the model (MJCF)")
+    ] = None,
+    from_s: Annotated[float | None, typer.Option("--from", metavar="S", help="first instant [s]")] = None,
+    to_s: Annotated[float | None, typer.Option("--to", metavar="S", help="last instant [s]")] = None,
+    hz: Annotated[float | None, typer.Option(help="how often the state is kept [1/s]")] = None,
+    step_ms: Annotated[float | None, typer.Option(help="time step [ms]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="write over what DIR holds")] = False,
+    json: Json = False,
+) -> int:
+    """Play a timed plan in MuJoCo, with masses, servos, gravity and contacts; the carriers close a real chain."""
+    return simulation.sim(plan, out, json, force, (from_s, to_s), hz, step_ms)

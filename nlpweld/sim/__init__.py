@@ -1,0 +1,1 @@
+"""Timed plans played in MuJoCo: a closed chain with masses, servos, gravity and contacts (extra ``sim``)."""
