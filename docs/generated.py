@@ -47,11 +47,17 @@ def commands() -> str:
 
 
 def built_in() -> str:
-    """Return the built-in cells, robots and positioners with their titles."""
+    """Return the built-in cells, robots, positioners and palletising tasks with their titles."""
     from nlpweld.cell import library_names, load_cell, load_positioner, load_robot
+    from nlpweld.palletising import load_pallet_task
 
     loaders = {"cells": load_cell, "robots": load_robot, "positioners": load_positioner}
-    rows = [(name, kind[:-1], load(name).title) for kind, load in loaders.items() for name in library_names(kind)]
+    loaders["palletising"] = load_pallet_task
+    rows = [
+        (name, kind.removesuffix("s"), load(name).title)
+        for kind, load in loaders.items()
+        for name in library_names(kind)
+    ]
     assert {kind.name for kind in LIBRARY.iterdir() if any(kind.glob("*.toml"))} == set(loaders)
     lines = [f"| `{name}` | {kind} | {title} |" for name, kind, title in rows]
     return "\n".join(["| name | what | title |", "|---|---|---|", *lines]) + "\n"

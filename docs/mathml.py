@@ -18,7 +18,6 @@ def _inline(translator: Any, node: nodes.math) -> None:
 
 
 def _block(translator: Any, node: nodes.math_block) -> None:
-    translator.body.append(
-        f'<div style="margin: 0.6em 0; padding: 0.4em 0; overflow: auto hidden">{convert(node.astext(), display="block")}</div>'
-    )
+    style = "margin: 0.6em 0; padding: 0.4em 0; overflow: auto hidden"
+    translator.body.append(f'<div style="{style}">{convert(node.astext(), display="block")}</div>')
     raise nodes.SkipNode

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from nlpweld.formulation.reduced import reduced
     from nlpweld.formulation.redundant import redundant
     from nlpweld.formulation.robust import robust
+    from nlpweld.palletising import load_pallet_task, palletize
     from nlpweld.plan import Plan, load_plan
     from nlpweld.solvers import Budget, solver_names
     from nlpweld.verify import Report, verify_robust
@@ -40,9 +41,11 @@ _HOMES = {
     "full_redundant": "formulation.full_redundant",
     "full_start": "formulation.full",
     "load_cell": "cell",
+    "load_pallet_task": "palletising",
     "load_plan": "plan",
     "load_positioner": "cell",
     "load_robot": "cell",
+    "palletize": "palletising",
     "reduced": "formulation.reduced",
     "redundant": "formulation.redundant",
     "robust": "formulation.robust",
@@ -67,9 +70,11 @@ __all__ = [
     "full_redundant",
     "full_start",
     "load_cell",
+    "load_pallet_task",
     "load_plan",
     "load_positioner",
     "load_robot",
+    "palletize",
     "reduced",
     "redundant",
     "robust",

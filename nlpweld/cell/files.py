@@ -34,7 +34,8 @@ def find(name_or_path: str | Path, kind: str, beside: Path | None = None) -> Pat
     for path in (Path(text), beside.parent / text if beside else Path(text)):
         if os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises where a name is too long
             return path
-    raise CellError(f"{text}: no such file and no built-in {kind[:-1]} of that name; {nearest(text, names)}")
+    one = kind.removesuffix("s")
+    raise CellError(f"{text}: no such file and no built-in {one} of that name; {nearest(text, names)}")
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from nlpweld.cli import ask, judge, look, simulation, study
+from nlpweld.cli import ask, judge, look, pallet, simulation, study
 from nlpweld.cli import export as export_
 from nlpweld.errors import OptionError
 
@@ -188,3 +188,20 @@ def sim(
 ) -> int:
     """Play a timed plan in MuJoCo, with masses, servos, gravity and contacts; the carriers close a real chain."""
     return simulation.sim(plan, out, json, force, (from_s, to_s), hz, step_ms)
+
+
+@app.command()
+def palletize(
+    task: Annotated[str, typer.Argument(metavar="[TASK]", help="a built-in task or a TOML file")] = "cao_25_boxes",
+    solver: Annotated[str, typer.Option(metavar="NAME", help="NAME or NAME:PRESET; see 'nlpweld cells'")] = "ipopt",
+    seed: Annotated[int, typer.Option(min=0, help="seed of every random draw")] = 0,
+    z_a: Annotated[
+        float | None, typer.Option(metavar="M", help="how high axis B can rise; the task's own by default")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="keep the tables as DIR/boxes.csv, layers.csv")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Time the stacking of boxes: before, after in closed form, and by a solver."""
+    return pallet.palletize(task, solver, seed, z_a, out, json)

@@ -13,12 +13,14 @@ from nlpweld.cell.checked import Checked, Sourced, holds_number
 
 def cells(json: bool) -> None:
     """Print what is built in."""
+    from nlpweld.palletising import load_pallet_task
     from nlpweld.solvers import presets, solver_names
 
     found = {
         "cells": {name: load_cell(name).title for name in library_names("cells")},
         "robots": {name: load_robot(name).title for name in library_names("robots")},
         "positioners": {name: load_positioner(name).title for name in library_names("positioners")},
+        "palletising": {name: load_pallet_task(name).title for name in library_names("palletising")},
         "solvers": {name: ", ".join(presets(name)) for name in solver_names()},
     }
     if json:

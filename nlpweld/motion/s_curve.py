@@ -61,6 +61,7 @@ class SCurve:
             t_s: instants from the start of the moves [s].
             derivative: 0 for position, 1 for velocity, 2 for acceleration, 3 for jerk, which jumps between pieces.
         """
+        outside = (t_s < 0) | (t_s > self.duration_s)
         t_s = np.clip(t_s, 0.0, self.duration_s)
         late = t_s > self.duration_s / 2
         # the second half is the first one seen from the end, so that the end is met to the last bit
@@ -69,6 +70,8 @@ class SCurve:
             value = np.where(late, np.abs(self.displacement) - value, value)
         elif derivative == 2:
             value = np.where(late, -value, value)
+        elif derivative == 3:
+            value = np.where(outside, 0.0, value)
         return np.sign(self.displacement) * value
 
     def time_at(self, position: np.ndarray) -> np.ndarray:
@@ -141,7 +144,7 @@ def s_curve(displacement: np.ndarray, limits: Limits) -> SCurve:
             overflows or vanishes.
     """
     given = finite(displacement, "displacement"), limits.velocity, limits.acceleration, limits.jerk
-    length, *bounds = (np.ascontiguousarray(array) for array in np.broadcast_arrays(*given))
+    length, *bounds = (array.copy() for array in np.broadcast_arrays(*given))  # contiguous, and ours
     times = np.empty((3, length.size))
     flat = [array.reshape(-1) for array in (np.abs(length), *bounds)]
     for begin in range(0, length.size, BLOCK):

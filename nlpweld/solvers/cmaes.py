@@ -82,4 +82,5 @@ class Cmaes:
             "verbose": -9,
             "verb_log": 0,
             "tolfun": 1e-9,
+            **({"maxstd": np.inf} if n == 1 else {}),  # pycma cannot hold back a single deviation
         }

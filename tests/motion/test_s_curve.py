@@ -60,6 +60,14 @@ def test_move_of_no_length_takes_no_time() -> None:
     assert move.time_at(np.zeros(2))[0] == 0.0
 
 
+def test_a_move_rests_before_and_after() -> None:
+    move = s_curve(-2.0, Limits(1.0, 1.0, 1.0))
+    assert move.duration_s.shape == ()
+    t = np.array([-0.1, move.duration_s + 0.1])
+    assert move.at(t).tolist() == [0.0, -2.0]
+    assert [move.at(t, k).tolist() for k in (1, 2, 3)] == [[0.0, 0.0]] * 3
+
+
 def test_million_moves_are_continuous_and_end_where_asked() -> None:
     """Up to twelve orders of magnitude between limits: no more than rounding at any edge."""
     L, limits = moves(MILLION, 6.0)
