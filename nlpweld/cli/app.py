@@ -7,6 +7,7 @@ import typer
 
 from nlpweld.cli import ask, judge, look, pallet, simulation, study
 from nlpweld.cli import export as export_
+from nlpweld.cli import view as view_
 from nlpweld.errors import OptionError
 
 app = typer.Typer(
@@ -205,3 +206,14 @@ def palletize(
 ) -> int:
     """Time the stacking of boxes: before, after in closed form, and by a solver."""
     return pallet.palletize(task, solver, seed, z_a, out, json)
+
+
+@app.command()
+def view(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a plan file")],
+    html: Annotated[Path, typer.Option(metavar="FILE", help="the page to write")],
+    beside: Annotated[Path | None, typer.Argument(metavar="[PLAN2]", help="another, shown beside it")] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite the page if it exists")] = False,
+) -> None:
+    """Write a page, whole in one file, that plays a plan, or two side by side."""
+    view_.view([plan] if beside is None else [plan, beside], html, force)

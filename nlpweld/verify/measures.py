@@ -72,11 +72,16 @@ def team(cell: Cell, w: dict[str, np.ndarray], ratio: dict[str, np.ndarray]) -> 
     return read(cell.objective.reading, beta, products(cell, w), (len(tight), len(loose)))
 
 
-def least_along(cell: Cell, w: dict[str, np.ndarray], Jv: dict[str, np.ndarray]) -> float:
-    """Return the least value of the cell's reading at M configurations, without their common volume, which cancels."""
+def team_along(cell: Cell, w: dict[str, np.ndarray], Jv: dict[str, np.ndarray]) -> np.ndarray:
+    """Return the cell's reading at M configurations, shape (M,), without their common volume, which cancels."""
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = {name: 1 / ellipsoid_volume(J @ J.swapaxes(-1, -2)) for name, J in Jv.items()}
-    return float(team(cell, w, shares).min())
+    return team(cell, w, shares)
+
+
+def least_along(cell: Cell, w: dict[str, np.ndarray], Jv: dict[str, np.ndarray]) -> float:
+    """Return the least value of the cell's reading at M configurations."""
+    return float(team_along(cell, w, Jv).min())
 
 
 def along_seam(objective: Objective, values: np.ndarray) -> float:

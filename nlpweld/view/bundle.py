@@ -1,0 +1,28 @@
+"""three.js, out of the installed meshcat: its built file holds the library and its orbit controls for a browser."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from nlpweld.errors import OptionError
+
+BUILT = Path("viewer") / "dist" / "main.min.js"  # exports MeshCat.THREE and MeshCat.Viewer
+MEND = "pip install 'nlpweld[view]'"
+
+
+def bundle() -> tuple[str, str]:
+    """Return the text of the built file, and of the licences it is under.
+
+    The package is not imported: its server is not needed.
+
+    Raises:
+        OptionError: meshcat is not installed, or holds no such file.
+    """
+    spec = find_spec("meshcat")
+    if spec is None or not spec.submodule_search_locations:
+        raise OptionError(f"view: the package meshcat, whose three.js draws the page, is missing; {MEND}")
+    path = Path(spec.submodule_search_locations[0]) / BUILT
+    licences = path.with_name(f"{path.name}.LICENSE.txt")
+    try:
+        return path.read_text(encoding="utf-8"), licences.read_text(encoding="utf-8")
+    except OSError:
+        raise OptionError(f"view: this meshcat has no {BUILT.as_posix()}; {MEND} --force-reinstall") from None
