@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from nlpweld.palletising import load_pallet_task, palletize
     from nlpweld.plan import Plan, load_plan
     from nlpweld.solvers import Budget, solver_names
-    from nlpweld.verify import Report, verify_robust
+    from nlpweld.timing import time_plan
+    from nlpweld.verify import Report, TimingReport, verify_robust, verify_timing
     from nlpweld.verify import verify as verify_plan
 
 __version__ = "0.1.0"
@@ -33,6 +34,7 @@ _HOMES = {
     "NlpweldError": "errors",
     "Plan": "plan",
     "Report": "verify",
+    "TimingReport": "verify",
     "compare": "bench.compare",
     "evaluate": "bench.answer",
     "export_plan": "export",
@@ -51,8 +53,10 @@ _HOMES = {
     "robust": "formulation.robust",
     "solve": "bench.answer",
     "solver_names": "solvers",
+    "time_plan": "timing",
     "verify_plan": "verify",
     "verify_robust": "verify",
+    "verify_timing": "verify",
 }
 
 __all__ = [
@@ -62,6 +66,7 @@ __all__ = [
     "NlpweldError",
     "Plan",
     "Report",
+    "TimingReport",
     "compare",
     "evaluate",
     "export_plan",
@@ -80,8 +85,10 @@ __all__ = [
     "robust",
     "solve",
     "solver_names",
+    "time_plan",
     "verify_plan",
     "verify_robust",
+    "verify_timing",
 ]
 
 

@@ -91,7 +91,7 @@ class Timeline:
 
     @cached_property
     def _curves(self) -> dict[str, PPoly]:
-        return {name: _quintic(self.t_s, track) for name, track in self.tracks.items()}
+        return {name: quintic(self.t_s, track) for name, track in self.tracks.items()}
 
     def to_json(self) -> dict[str, Any]:
         """Return the timeline as plain data."""
@@ -127,6 +127,19 @@ def timeline_from(data: Any, counts: Mapping[str, int]) -> Timeline:
     return Timeline(t_s, s, _phases(data.get("phases"), float(t_s[-1])), tracks)
 
 
+def quintic(t_s: np.ndarray, track: Track) -> PPoly:
+    """Return the piecewise quintic through a track, coefficients of falling powers (6, M - 1, n)."""
+    h = np.diff(t_s)[:, None]
+    q0, v0, a0 = track.q[:-1], track.rate[:-1], track.acceleration[:-1]
+    rest = np.diff(track.q, axis=0) - h * (v0 + h * a0 / 2)  # what the cubic and higher terms bring by the end
+    rate = track.rate[1:] - v0 - h * a0
+    bend = track.acceleration[1:] - a0
+    cubic = (10 * rest / h - 4 * rate + h * bend / 2) / h**2
+    quartic = (-15 * rest / h + 7 * rate - h * bend) / h**3
+    fifth = (6 * rest / h - 3 * rate + h * bend / 2) / h**4
+    return PPoly(np.stack([fifth, quartic, cubic, a0 / 2, v0, q0]), t_s)
+
+
 def _phases(given: Any, end_s: float) -> tuple[tuple[str, float], ...]:
     try:
         phases = tuple((str(one["name"]), float(one["until_s"])) for one in given)
@@ -158,16 +171,3 @@ def _array(data: dict[str, Any], name: str, shape: tuple[int, ...], where: str =
     if array.ndim != len(shape) or (shape != (-1,) and array.shape != shape):
         raise ValueError(f"{where}: not of shape {shape}" if shape != (-1,) else f"{where}: not a list of numbers")
     return array
-
-
-def _quintic(t_s: np.ndarray, track: Track) -> PPoly:
-    """Return the piecewise quintic through a track, coefficients of falling powers (6, M - 1, n)."""
-    h = np.diff(t_s)[:, None]
-    q0, v0, a0 = track.q[:-1], track.rate[:-1], track.acceleration[:-1]
-    rest = np.diff(track.q, axis=0) - h * (v0 + h * a0 / 2)  # what the cubic and higher terms bring by the end
-    rate = track.rate[1:] - v0 - h * a0
-    bend = track.acceleration[1:] - a0
-    cubic = (10 * rest / h - 4 * rate + h * bend / 2) / h**2
-    quartic = (-15 * rest / h + 7 * rate - h * bend) / h**3
-    fifth = (6 * rest / h - 3 * rate + h * bend / 2) / h**4
-    return PPoly(np.stack([fifth, quartic, cubic, a0 / 2, v0, q0]), t_s)

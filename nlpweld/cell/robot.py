@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 
 from nlpweld.cell.checked import Checked, Finite, Name, Positive, Sourced, Vector
 
+DRIVES = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
+
 
 class Joint(Checked):
     """One row of the standard Denavit-Hartenberg table, ``Rz(q + offset) Tz(d) Tx(a) Rx(alpha)``.
@@ -40,7 +42,7 @@ class Drives(Sourced):
     @property
     def stated(self) -> dict[str, tuple[float, ...]]:
         """The limits that are stated, by the names of their fields."""
-        limits = {name: getattr(self, name) for name in ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")}
+        limits = {name: getattr(self, name) for name in DRIVES}
         return {name: values for name, values in limits.items() if values is not None}
 
 
@@ -98,6 +100,12 @@ class Robot(Sourced):
         """Joint limits in DH direction, shape (n, 2) [rad]."""
         rows = [sorted((j.sign * j.lower_deg, j.sign * j.upper_deg)) for j in self.joints]
         return np.radians(np.array(rows, dtype=float))
+
+    @property
+    def drive_limits(self) -> np.ndarray:
+        """Greatest speed, acceleration and jerk of the joints, shape (3, n) [rad/s and so on]; NaN where not stated."""
+        rows = [getattr(self.drives, name, None) for name in DRIVES]
+        return np.radians([[np.nan] * len(self.joints) if row is None else row for row in rows])
 
     @property
     def dh(self) -> np.ndarray:

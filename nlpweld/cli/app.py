@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from nlpweld.cli import ask, judge, look, pallet, simulation, study
+from nlpweld.cli import ask, judge, look, pallet, simulation, study, timed
 from nlpweld.cli import export as export_
 from nlpweld.cli import view as view_
 from nlpweld.errors import OptionError
@@ -106,6 +106,66 @@ def verify(
 
 
 @app.command()
+def time(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a plan file")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="keep the timed plan")] = None,
+    speed: Annotated[
+        float | None, typer.Option(metavar="M_S", help="of the torch along the seam [m/s]; the cell's own by default")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="draw torch speed and joint speeds over time, as PNG")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Time a plan: home, weld, home; slowed only where a joint's limit binds, and verified between instants."""
+    return timed.time(plan, out, speed, figure, json)
+
+
+@app.command()
+def view(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a plan file")],
+    html: Annotated[Path, typer.Option(metavar="FILE", help="the page to write")],
+    beside: Annotated[Path | None, typer.Argument(metavar="[PLAN2]", help="another, shown beside it")] = None,
+    force: Annotated[bool, typer.Option("--force", help="overwrite the page if it exists")] = False,
+) -> None:
+    """Write a page, whole in one file, that plays a plan, or two side by side."""
+    view_.view([plan] if beside is None else [plan, beside], html, force)
+
+
+@app.command()
+def sim(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a timed plan file; see 'nlpweld time'")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="keep report, time series, figures and the model (MJCF)")
+    ] = None,
+    from_s: Annotated[float | None, typer.Option("--from", metavar="S", help="first instant [s]")] = None,
+    to_s: Annotated[float | None, typer.Option("--to", metavar="S", help="last instant [s]")] = None,
+    hz: Annotated[float | None, typer.Option(help="how often the state is kept [1/s]")] = None,
+    step_ms: Annotated[float | None, typer.Option(help="time step [ms]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="write over what DIR holds")] = False,
+    json: Json = False,
+) -> int:
+    """Play a timed plan in MuJoCo, with masses, servos, gravity and contacts; the carriers close a real chain."""
+    return simulation.sim(plan, out, json, force, (from_s, to_s), hz, step_ms)
+
+
+@app.command()
+def export(
+    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a timed plan file")],
+    format: Annotated[str, typer.Option(metavar="NAME", help="csv, ros2, ros2-json, rapid or krl")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="folder for the files")],
+    force: Annotated[bool, typer.Option("--force", help="replace files that exist")] = False,
+    every: Annotated[
+        float | None,
+        typer.Option(help="longest step between points [s]; as few points as keep within 0.01 deg by default"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a timed plan as joint sequences for controllers."""
+    export_.export(plan, format, out, force, every, json)
+
+
+@app.command()
 def compare(
     out: Annotated[Path, typer.Option(metavar="DIR", help="folder of the study; what it holds is not run again")],
     cells: Annotated[list[str] | None, typer.Argument(metavar="[CELL...]", help="built-in cells or TOML files")] = None,
@@ -159,39 +219,6 @@ def report(folder: Annotated[Path, typer.Argument(metavar="DIR")], json: Json = 
 
 
 @app.command()
-def export(
-    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a timed plan file")],
-    format: Annotated[str, typer.Option(metavar="NAME", help="csv, ros2, ros2-json, rapid or krl")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="folder for the files")],
-    force: Annotated[bool, typer.Option("--force", help="replace files that exist")] = False,
-    every: Annotated[
-        float | None,
-        typer.Option(help="longest step between points [s]; as few points as keep within 0.01 deg by default"),
-    ] = None,
-    json: Json = False,
-) -> None:
-    """Write a timed plan as joint sequences for controllers."""
-    export_.export(plan, format, out, force, every, json)
-
-
-@app.command()
-def sim(
-    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a timed plan file; see 'nlpweld time'")],
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="keep report, time series, figures and the model (MJCF)")
-    ] = None,
-    from_s: Annotated[float | None, typer.Option("--from", metavar="S", help="first instant [s]")] = None,
-    to_s: Annotated[float | None, typer.Option("--to", metavar="S", help="last instant [s]")] = None,
-    hz: Annotated[float | None, typer.Option(help="how often the state is kept [1/s]")] = None,
-    step_ms: Annotated[float | None, typer.Option(help="time step [ms]")] = None,
-    force: Annotated[bool, typer.Option("--force", help="write over what DIR holds")] = False,
-    json: Json = False,
-) -> int:
-    """Play a timed plan in MuJoCo, with masses, servos, gravity and contacts; the carriers close a real chain."""
-    return simulation.sim(plan, out, json, force, (from_s, to_s), hz, step_ms)
-
-
-@app.command()
 def palletize(
     task: Annotated[str, typer.Argument(metavar="[TASK]", help="a built-in task or a TOML file")] = "cao_25_boxes",
     solver: Annotated[str, typer.Option(metavar="NAME", help="NAME or NAME:PRESET; see 'nlpweld cells'")] = "ipopt",
@@ -206,14 +233,3 @@ def palletize(
 ) -> int:
     """Time the stacking of boxes: before, after in closed form, and by a solver."""
     return pallet.palletize(task, solver, seed, z_a, out, json)
-
-
-@app.command()
-def view(
-    plan: Annotated[Path, typer.Argument(metavar="PLAN", help="a plan file")],
-    html: Annotated[Path, typer.Option(metavar="FILE", help="the page to write")],
-    beside: Annotated[Path | None, typer.Argument(metavar="[PLAN2]", help="another, shown beside it")] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite the page if it exists")] = False,
-) -> None:
-    """Write a page, whole in one file, that plays a plan, or two side by side."""
-    view_.view([plan] if beside is None else [plan, beside], html, force)

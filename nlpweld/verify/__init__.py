@@ -9,8 +9,10 @@ if TYPE_CHECKING:
     from nlpweld.verify.check import verify
     from nlpweld.verify.report import Report, Violation
     from nlpweld.verify.robust import verify_robust
+    from nlpweld.verify.timing import verify_timing
+    from nlpweld.verify.timing_report import TimingReport
 
-__all__ = ["Report", "Violation", "verify", "verify_robust"]
+__all__ = ["Report", "TimingReport", "Violation", "verify", "verify_robust", "verify_timing"]
 
 
 def __getattr__(name: str) -> Any:
@@ -22,6 +24,14 @@ def __getattr__(name: str) -> Any:
         from nlpweld.verify.robust import verify_robust
 
         return verify_robust
+    if name == "verify_timing":
+        from nlpweld.verify.timing import verify_timing
+
+        return verify_timing
+    if name == "TimingReport":
+        from nlpweld.verify.timing_report import TimingReport
+
+        return TimingReport
     if name in ("Report", "Violation"):
         from nlpweld.verify import report
 

@@ -44,6 +44,18 @@ def verify(plan: Plan) -> Report:
     return _report(plan, scene, measures, worst_first(rules.violations(plan, scene)))
 
 
+def refuse_wrong(plan: Plan) -> None:
+    """Refuse a plan whose shapes contradict its cell, or that holds NaN or infinity.
+
+    Raises:
+        PlanError: says what.
+    """
+    _refuse_wrong_shapes(plan)
+    infinite = _not_finite(plan)
+    if infinite:
+        raise PlanError(f"{infinite[0].robot or 'placement'}: {infinite[0].note}; solve again")
+
+
 def _report(plan: Plan, scene: Scene, measures: Measures, violations: tuple[Violation, ...]) -> Report:
     at = scene.motion.at
     point, pair = _closest(scene.clearance_m[at])
