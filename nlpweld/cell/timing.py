@@ -28,7 +28,8 @@ class Timing(Sourced):
         torch: of the torch along the seam on the workpiece: the weld's speed, held wherever no limit binds, and how it
             gets there from rest at the seam's start and end.
         travel: of straight moves off the seam: a torch between seam and stand-off, a workpiece that is carried in.
-        stand_off_m: how far back along its own axis a torch is before it comes to the seam and after it leaves.
+        stand_off_m: how far off the seam a torch is before it comes to it and after it leaves: back along its own axis,
+            or straight up where the way home from there is not free.
         carry_m: from the placement to where a workpiece that robots carry is taken over, in W; robots bring it from
             there before they weld, and back afterwards.
         home_deg: joints of a welding robot where it waits, as its controller shows them, by station.

@@ -36,5 +36,5 @@ def time(path: Path, out: Path | None, speed_m_s: float | None, figure: Path | N
         print(json_.dumps({**report.to_json(), **files}))
     else:
         print(report)
-        print("".join(f"{name}: {file}\n" for name, file in files.items()) or "add --out FILE to keep the timed plan")
+        print("\n".join(f"{name}: {file}" for name, file in files.items()) or "add --out FILE to keep the timed plan")
     return 0 if report.feasible else 1

@@ -15,6 +15,7 @@ from nlpweld.timing.law import paced, slowed
 from nlpweld.timing.moves import Part, in_a_row, joined, together
 from nlpweld.timing.off_seam import (
     Waypoints,
+    back_off,
     backwards,
     carry,
     homes,
@@ -41,6 +42,7 @@ class Cycle:
         limits: of rate, acceleration and jerk of all joints side by side that plans are made with, shape (3, J).
         jerk: the jerk limits themselves, and none for the seam parameter, shape (J + 1,).
         step_s: greatest time between instants [s].
+        upwards: whether torches come from above the seam and leave it straight up, instead of along their own axes.
     """
 
     along: Along
@@ -48,6 +50,7 @@ class Cycle:
     limits: np.ndarray
     jerk: np.ndarray
     step_s: float
+    upwards: bool = False
 
     def phases(self) -> list[tuple[str, States]]:
         """Return all phases in their order.
@@ -74,10 +77,11 @@ class Cycle:
     @cached_property
     def _plunges(self) -> dict[tuple[str, bool], Curve]:
         """The way of every torch back from the seam's start (False) and end (True)."""
-        length = self.timing.stand_off_m
-        return {
-            (name, end): stand_off(self.along, name, end, length) for name in self._welders for end in (False, True)
-        }
+        ends = [(name, end) for name in self._welders for end in (False, True)]
+        return {(name, end): stand_off(self.along, name, end, self._back(name, end)) for name, end in ends}
+
+    def _back(self, name: str, at_end: bool) -> np.ndarray:
+        return back_off(self.along, name, at_end, self.timing.stand_off_m, self.upwards)
 
     def _end(self, at_end: bool) -> np.ndarray:
         """Return joints and parameter at the seam's start or end, shape (J + 1,)."""
@@ -105,12 +109,14 @@ class Cycle:
             first = first or trouble
             if hopeless:
                 break
-        raise MotionError(f"{phase}: {first}, and no way round was found; give another home_deg or carry_m in [timing]")
+        raise MotionError(
+            f"{phase}: {first}, and no way round was found; give another home_deg, stand_off_m or carry_m in [timing]"
+        )
 
     def _ways(self, at_end: bool) -> Iterator[dict[str, Waypoints]]:
         """Yield by which places each torch goes, the most direct ways first."""
         yield dict.fromkeys(self._welders, ())
-        each = [vias(self.along, name, at_end, self.timing.stand_off_m) for name in self._welders]
+        each = [vias(self.along, name, at_end, self._back(name, at_end)) for name in self._welders]
         ranks = sorted(product(*(range(len(places)) for places in each)), key=lambda k: (sum(k), k))
         for rank in ranks[1:MOST]:
             yield {name: places[k] for name, places, k in zip(self._welders, each, rank, strict=True)}

@@ -92,10 +92,16 @@ def seam_end(along: Along, name: str, at_end: bool) -> tuple[np.ndarray, np.ndar
     return row[0, along.columns[name]], along.wanted.tool(along.arms[name].station, s, T_W_C)[0]
 
 
-def stand_off(along: Along, name: str, at_end: bool, length_m: float) -> Curve:
-    """Return a torch's way back along its own axis from the seam's start or end, over its length."""
+def back_off(along: Along, name: str, at_end: bool, length_m: float, upwards: bool) -> np.ndarray:
+    """Return from the seam's start or end to a torch's stand-off, back along its own axis or straight up, (3,) [m]."""
+    _, T_W_E = seam_end(along, name, at_end)
+    return length_m * (np.array([0.0, 0.0, 1.0]) if upwards else -T_W_E[:3, 2])
+
+
+def stand_off(along: Along, name: str, at_end: bool, offset_W: np.ndarray) -> Curve:
+    """Return a torch's straight way from the seam's start or end to its stand-off, over its length."""
     q, T_W_E = seam_end(along, name, at_end)
-    return away(along.arms[name], T_W_E, q, -length_m * T_W_E[:3, 2])
+    return away(along.arms[name], T_W_E, q, offset_W)
 
 
 def carry(along: Along, name: str, at_end: bool, offset_W: np.ndarray) -> Curve | None:
@@ -106,17 +112,17 @@ def carry(along: Along, name: str, at_end: bool, offset_W: np.ndarray) -> Curve 
     return away(along.arms[name], T_W_E, q, offset_W)
 
 
-def vias(along: Along, name: str, at_end: bool, length_m: float) -> list[Waypoints]:
+def vias(along: Along, name: str, at_end: bool, offset_W: np.ndarray) -> list[Waypoints]:
     """Return the places by which a torch may go home from its stand-off, in the order to try: first by none.
 
-    They are the stand-off moved aside and raised, the nearest first.
+    They are the stand-off, ``offset_W`` from the seam, moved aside and raised, the nearest first.
     """
     q, T_W_E = seam_end(along, name, at_end)
     arm, limits = along.arms[name], along.arms[name].station.robot.limits_rad
     found: list[Waypoints] = [()]
     for offset in _aside():
         try:
-            via = away(arm, T_W_E, q, offset - length_m * T_W_E[:3, 2]).at(np.array([np.inf]))[0]
+            via = away(arm, T_W_E, q, offset + offset_W).at(np.array([np.inf]))[0]
         except PlanError:
             continue
         if ((via >= limits[:, 0]) & (via <= limits[:, 1])).all():

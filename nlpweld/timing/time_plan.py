@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nlpweld.errors import MotionError
+from nlpweld.errors import MotionError, PlanError
 from nlpweld.motion.limits import finite
 from nlpweld.plan import Plan
 from nlpweld.timing.cycle import Cycle
@@ -46,7 +46,16 @@ def time_plan(plan: Plan, speed_m_s: float | None = None, step_s: float = STEP_S
     along = along_seam(plan, wanted(plan, cell.timing.blend_m), wanted(plan, 0.0))
     jerk = np.append(limits[2], np.inf)
     cycle = Cycle(along, cell.timing, limits * (1 - RESERVE), jerk, step)
-    return plan.timed(joined(plan, cycle.phases()))
+    try:
+        phases = cycle.phases()
+    except MotionError:
+        try:
+            phases = replace(cycle, upwards=True).phases()
+        except (MotionError, PlanError):
+            phases = None
+        if phases is None:
+            raise  # of the way along the torches' own axes
+    return plan.timed(joined(plan, phases))
 
 
 def _above_zero(value: float, name: str) -> float:

@@ -23,6 +23,7 @@ CLOSURE = 1e-6  # [m] and [rad]: of handlers, torches and postures
 SMOOTHED_RAD = np.radians(5.0)  # ISO 6947: test pieces may be off their position by 5 degrees in slope
 SPLINE_RAD = np.radians(1.0)  # between points, free angles may leave the straight lines of the plan by this
 POINTS_RAD = 1e-3  # by which joints may be off the plan's at its points, outside blends
+LEAN = np.radians(60.0)  # between a torch's axis and its straight way to the seam
 STILL = 1e-9  # [rad/s] and [rad/s^2], at both ends of the cycle
 UNITS = ("rad/s", "rad/s^2", "rad/s^3")
 
@@ -212,14 +213,17 @@ def rest(seen: Moving) -> Iterator[Failure]:
 
 
 def axis(seen: Moving, torches: dict[str, OnSeam]) -> Iterator[Failure]:
-    """Torches come to the seam and leave it along their own axes."""
+    """Torches come to the seam and leave it in a straight line, not turned, and within a lean of their own axes."""
     for name in torches:
         for phase, end in (("plunge", -1), ("withdraw", 0)):
             at = seen.during(phase)
             if len(at):
                 T = seen.tcps[name][at]
                 way, z = T[:, :3, 3] - T[end, :3, 3], T[end, :3, 2]
-                aside = np.linalg.norm(way - (way @ z)[:, None] * z, axis=-1) + np.maximum(way @ z, 0.0)
+                line = way[-1 - end] / np.linalg.norm(way[-1 - end])
+                aside = np.linalg.norm(way - (way @ line)[:, None] * line, axis=-1) + np.maximum(-way @ line, 0.0)
+                lean = np.full(len(at), np.arccos(np.clip(-line @ z, -1.0, 1.0)))
+                yield from _worst(seen, "axis", lean, LEAN, "rad", name, at, phase=phase)
                 turned = ref.error_size(ref.pose_error(np.tile(T[end], (len(at), 1, 1)), T))[1]
                 yield from _worst(seen, "axis", aside, CLOSURE, "m", name, at, phase=phase)
                 yield from _worst(seen, "axis", turned, CLOSURE, "rad", name, at, phase=phase)

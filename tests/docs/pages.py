@@ -10,17 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import typer
-
 from nlpweld.cli import main
-from nlpweld.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 SHOWN = ("text", "toml")  # languages of blocks that are only to be read
 NUMBER = r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])"
 SKIPPED = re.compile(r"<!-- blocks: skipped: (.+) -->$")
-WAITING = ("time", "view")  # commands that pages may tell of before the command line has them
-MADE_BY = {"out/timed.json": "time"}  # a file that later blocks need, and the command that makes it
 
 
 @dataclass(frozen=True)
@@ -69,19 +64,14 @@ def commands(block: Block) -> list[tuple[str, str | None]]:
     return [(command, shown.strip("\n") if shown.strip() else None) for command, _, shown in split]
 
 
-def run_command(line: str) -> str | None:
-    """Run a command line of nlpweld in this process; return what it printed, or None where it waits for a command.
+def run_command(line: str) -> str:
+    """Run a command line of nlpweld in this process; return what it printed.
 
     Raises:
-        AssertionError: there is no such command, or it ended with another status than 0.
+        AssertionError: it ended with another status than 0.
     """
     words = shlex.split(line, comments=True)
     assert words[0] == "nlpweld", f"'{line}' is no nlpweld command; run it by hand or skip its block with a reason"
-    known = typer.main.get_command(app).commands
-    needed = {MADE_BY[word] for word in words if word in MADE_BY} | {words[1]}
-    missing = needed - set(known)
-    if missing and missing <= set(WAITING):
-        return None
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:

@@ -6,8 +6,11 @@ import pytest
 from nlpweld.errors import MotionError, PlanError
 from nlpweld.plan import load_plan
 from nlpweld.timing import time_plan
+from nlpweld.timing.cycle import Cycle
 from nlpweld.timing.joints import along_seam
 from nlpweld.timing.wanted import wanted
+from nlpweld.verify import time_rules
+from nlpweld.verify.reference import link_poses, tcp_pose
 from nlpweld.verify.timing import verify_timing
 
 from .helpers import with_drives, with_timing
@@ -47,6 +50,21 @@ def test_a_positioner_unwinds_by_itself(timed_flange):
     report = verify_timing(timed_flange)
     assert report.windings["positioner"] == (0, -1)
     assert not any(any(turns) for turns in report.left.values())
+
+
+def test_torches_leave_straight_up_where_no_way_along_their_axes_is_free(trough, monkeypatch):
+    """Their axes lean by 45 degrees here."""
+    own = Cycle._trouble
+    monkeypatch.setattr(Cycle, "_trouble", lambda self, *_: own(self, *_) if self.upwards else ("too near", True))
+    timed = time_plan(trough, 0.04)
+    assert verify_timing(timed).feasible
+    station, line = timed.cell.stations[0], timed.timeline
+    begin, end = (
+        tcp_pose(station, link_poses(station, line.at(np.array([t]))["robot_1"]))[0] for t in line.span_s("withdraw")
+    )
+    assert end[:3, 3] - begin[:3, 3] == pytest.approx([0.0, 0.0, timed.cell.timing.stand_off_m], abs=1e-6)
+    monkeypatch.setattr(time_rules, "LEAN", np.radians(40.0))
+    assert {failure.check for failure in verify_timing(timed).failures} == {"axis"}
 
 
 def test_without_blends_it_stops_at_kinks(trough):
