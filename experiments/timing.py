@@ -32,11 +32,8 @@ from nlpweld.verify import TimingReport, verify, verify_timing
 
 SPEEDS_M_S = (0.008, 0.03, 0.1, 0.3, 1.0)  # the first is that of the cells
 OPTIMA = {"optimum": "reduced", "optimum, spin free": "redundant_spin"}
-PLANS = [
-    ("three_er16", "paper"),
-    *(("dual_welder_positioner", name) for name in "ABCD"),
-    *((cell, name) for cell in ("three_er16", "dual_welder_positioner", "robot_positioner") for name in OPTIMA),
-]
+NAMED = {"three_er16": ("paper",), "dual_welder_positioner": tuple("ABCD"), "robot_positioner": ()}
+PLANS = [(cell, name) for cell, named in NAMED.items() for name in (*named, *OPTIMA)]
 DIGITS = {
     "objective": 5, "torch_mm_s": 0, "cycle_s": 3, "arc_on_s": 3, "off_seam_s": 3, "quickest_s": 3, "slower_percent": 1,
     "least_mm_s": 1, "used_percent": 1, "closure_um": 3, "blended_deg": 2, "turns": 0,
@@ -156,8 +153,7 @@ def study(chosen: argparse.Namespace, console: Console) -> str:
 def main() -> int:
     """Run the study from the command line."""
     parser = arguments(__doc__, "results/timing")
-    names = list(dict.fromkeys(cell for cell, _ in PLANS))
-    parser.add_argument("--cells", nargs="+", choices=names, default=names, help="which; all by default")
+    parser.add_argument("--cells", nargs="+", choices=list(NAMED), default=list(NAMED), help="which; all by default")
     parser.add_argument("--speeds", type=int, default=len(SPEEDS_M_S), help="how many, from the cells' own on")
     parser.add_argument("--no-figures", action="store_true", help="stop after the table")
     return told(parser, study)

@@ -8,7 +8,7 @@ import numpy as np
 from nlpweld.timeline import Track, quintic
 
 CLOSE_S = 1e-4  # instants nearer to each other than this are one: third derivatives lose digits with the cube of it
-MISS_RAD = 1e-7  # by which a quintic may miss the motion half-way between two instants
+MISS_RAD = 2e-8  # by which a quintic may miss the motion half-way between two instants
 DEPTH = 8  # halvings of an interval
 LOOKS = 11  # places in an interval at which its jerk is looked at
 State = tuple[np.ndarray, np.ndarray, np.ndarray]
