@@ -17,6 +17,16 @@ class OptionError(NlpweldError):
     """An option of a command, a solver or a formulation is not one of those there are."""
 
 
+def missing(what: str, extra: str) -> OptionError:
+    """Return the error of a package that is not installed.
+
+    Args:
+        what: the package, as people know it, and what asked for it.
+        extra: the extra that brings it; pip finds it by the installed nlpweld, in whatever folder it is called.
+    """
+    return OptionError(f"{what} is not installed; bring it with: pip install 'nlpweld[{extra}]'")
+
+
 class KinematicsError(NlpweldError):
     """A chain has no closed-form inverse here, or a pose cannot be reached."""
 

@@ -7,8 +7,12 @@ from xml.etree import ElementTree
 
 from nlpweld.bench.answer import Answer
 from nlpweld.html_table import html_table
+from nlpweld.sim.options import SimOptions
+from nlpweld.sim.report import Complaint, GraspResult, Peak, SimReport, TorchResult
 from nlpweld.solvers import Outcome
 from nlpweld.verify.check import verify
+from nlpweld.verify.timing import verify_timing
+from nlpweld.verify.timing_report import Failure
 from tests.export.timed import carried, turned
 
 
@@ -71,6 +75,37 @@ def test_answer_tells_claim_from_finding():
     assert read(Answer(claimed, None, None)._repr_html_())[0][0] == "answer: no answer to verify"
     refused = dataclasses.replace(report, feasible=False)
     assert read(Answer(claimed, turned(), refused)._repr_html_())[0][0] == "answer: NOT verified"
+
+
+def test_a_timing_report_tells_phases_and_failures():
+    plan = carried()
+    report = verify_timing(plan)
+    (title, rows), *rest = read(report._repr_html_())
+    assert title.startswith(f"{plan.cell.name}: cycle {report.cycle_s:.3f} s")
+    assert [row[0] for row in rows[1:]] == [name for name, _ in plan.timeline.phases]
+    assert len(rest) == bool(report.failures)
+    assert title.endswith("NOT verified") == bool(report.failures)
+    good, bad = (
+        dataclasses.replace(report, failures=found) for found in ((), (Failure("rate", 1.0, "weld", 2.0, 1.0),))
+    )
+    assert [t for t, _ in read(good._repr_html_())] == [title.replace("NOT verified", "verified")]
+    assert read(bad._repr_html_())[1] == ("failures", [[str(bad.failures[0])]])
+
+
+def test_a_simulation_tells_what_came_of_torches_and_grasps():
+    none, options = Peak(0.0, 0.0), SimOptions()
+    torch = TorchResult(Peak(1.5e-3, 2.0), 1e-3, none, none)
+    grasp = GraspResult(*[Peak(2e-6, 1.0)] * 6)
+    report = SimReport(
+        "c", 0.0, 1.0, {"welder": torch}, {"handler": grasp}, squeeze_n=None, servo_nm={}, servo_error_rad={},
+        clearance_m=0.02, clearance_s=1.0, clearance_pair="a - b", contacts=(), wall_s=0.1, steps=9, options=options,
+        complaints=(Complaint("torch", "welder", 2.0, 1.5e-3, 1e-3, "m"),),
+    )  # fmt: skip
+    (title, rows), (_, missed) = read(report._repr_html_())
+    assert "does NOT hold" in title
+    assert rows[0] == ["torch of welder", "1.5 mm off the seam"]
+    assert rows[1][1].startswith("drifts 2")
+    assert missed == [[str(report.complaints[0])]]
 
 
 def test_a_cell_shows_itself_without_what_is_slow_to_load():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from nlpweld.bench.apart import Ending, Job, end, run_apart
-from nlpweld.errors import OptionError
+from nlpweld.errors import OptionError, missing
 
 ANSWER_S = 10.0  # how long a scheduler may take to answer
 
@@ -70,7 +70,7 @@ class OnDask:
         try:
             import distributed
         except ImportError:
-            raise OptionError("--scheduler: Dask is not installed; run: pip install 'nlpweld[dask]'") from None
+            raise missing("--scheduler: Dask", "dask") from None
         self._cluster: Any = None
         try:
             if address == "local":

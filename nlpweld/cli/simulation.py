@@ -5,7 +5,7 @@ from pathlib import Path
 
 from nlpweld.cli.ask import writable
 from nlpweld.cli.judge import progress_bar
-from nlpweld.errors import OutputError
+from nlpweld.errors import OutputError, PlanError
 from nlpweld.plan import load_plan
 
 
@@ -36,7 +36,10 @@ def sim(
         if (out / REPORT).exists() and not force:
             raise OutputError(f"{out / REPORT}: exists; add --force to write over it, or choose another --out")
     options = chosen(hz, step_ms)
-    set_up = stage(plan, options, span_s)
+    try:
+        set_up = stage(plan, options, span_s)
+    except PlanError as error:
+        raise PlanError(f"{path}: {error}") from None
     with progress_bar(quiet=json) as bar:
         job = bar.add_task("steps", total=len(set_up.t_s))
         simulated = run(plan, set_up, options, lambda done, _: bar.update(job, completed=done))

@@ -6,7 +6,7 @@ pays when a cell is solved many times, for compiling takes ten seconds.
 
 from importlib.util import find_spec
 
-from nlpweld.errors import OptionError
+from nlpweld.errors import OptionError, missing
 
 ENGINES = ("auto", "numpy", "numba", "c")
 
@@ -21,7 +21,7 @@ def chosen_engine(name: str) -> str:
         raise OptionError(f"engine '{name}' is unknown; there are: {', '.join(ENGINES)}")
     installed = find_spec("numba") is not None
     if name == "numba" and not installed:
-        raise OptionError("engine 'numba' is not installed; bring it with: pip install 'nlpweld[fast]'")
+        raise missing("engine 'numba'", "fast")
     if name == "auto":
         return "numba" if installed else "numpy"
     return name

@@ -33,7 +33,7 @@ def chosen(timeline: Timeline, s: np.ndarray, every_s: float | None = None) -> n
         return _few_enough(_thinned(timeline, _refined(timeline, held), held))
     if not (np.isfinite(every_s) and every_s > 0):
         raise OptionError(f"--every {every_s:g} is no step above 0; give one in seconds, e.g. 0.05")
-    counts = np.ceil(np.diff(ends) / every_s - 1e-9)
+    counts = np.maximum(np.ceil(np.diff(ends) / every_s - 1e-9), 1)
     if counts.sum() > MOST:
         raise _too_many(int(counts.sum()))
     pieces = [np.linspace(*span, int(n), endpoint=False) for span, n in zip(pairwise(ends), counts, strict=True)]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from nlpweld.errors import OptionError
+from nlpweld.errors import missing
 
 
 def mujoco() -> Any:
@@ -17,7 +17,7 @@ def mujoco() -> Any:
     try:
         return importlib.import_module("mujoco")
     except ImportError:
-        raise OptionError("MuJoCo is not installed; bring it with: pip install 'nlpweld[sim]'") from None
+        raise missing("MuJoCo", "sim") from None
 
 
 @contextmanager

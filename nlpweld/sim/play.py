@@ -18,6 +18,7 @@ from nlpweld.sim.recording import Keeper, Recording
 
 Told = Callable[[int, int], None]
 TOLD_EVERY = 500  # steps
+MOST_STEPS = 2_000_000  # whose commands take a third of a gigabyte for 18 joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,18 +49,22 @@ def stage(plan: Plan, options: SimOptions, span_s: tuple[float | None, float | N
         span_s: first and last instant of the timeline; None is its end.
 
     Raises:
-        OptionError: MuJoCo is missing, or the span is not within the timeline.
+        OptionError: MuJoCo is missing, or the span is not within the timeline, shorter than a step or of too many.
         PlanError: the plan is not timed.
     """
     if plan.timeline is None:
-        raise PlanError("the plan is not timed; time it first with 'nlpweld time PLAN --out FILE'")
+        raise PlanError("timeline: missing; time it first with 'nlpweld time PLAN --out FILE'")
     timeline, cell = plan.timeline, plan.cell
     begin = 0.0 if span_s[0] is None else span_s[0]
     end = timeline.duration_s if span_s[1] is None else span_s[1]
     if not 0.0 <= begin < end <= timeline.duration_s:
         raise OptionError(f"from {begin:g} to {end:g} s is not within the plan's 0 to {timeline.duration_s:g} s")
     step = options.numerics.step_s
-    t_s = begin + step * np.arange(int(np.floor((end - begin) / step + 1e-9)) + 1)
+    steps = (end - begin) / step
+    if not 1 - 1e-9 <= steps <= MOST_STEPS:
+        few = f"{1e3 * (end - begin):g} ms are {steps:,.3g} steps of {1e3 * step:g} ms"
+        raise OptionError(f"{few}; a simulation takes 1 to {MOST_STEPS:,}, see --from, --to and --step-ms")
+    t_s = begin + step * np.arange(int(np.floor(steps + 1e-9)) + 1)
     controllers = open_model(cell, plan.placement, options.masses)
     gains = servo_gains(cell, controllers, planned(cell, timeline, t_s[:1])[0], options.servos)
     bare = cell_spec(cell, plan.placement, options).compile()

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from nlpweld.html_table import html_table
 from nlpweld.sim.options import SimOptions
 from nlpweld.sim.recording import Contact
 
@@ -146,6 +147,19 @@ class SimReport:
         """Return plain JSON data; NaN and infinity become None."""
         plain: dict[str, Any] = _plain({"holds": self.holds, **asdict(self)})
         return plain
+
+    def _repr_html_(self) -> str:
+        """Show in a notebook the verdict, how torches and grasps did at worst, and what was not kept."""
+        rows = [
+            (f"torch of {name}", f"{_mm(torch.seam_m.value)} mm off the seam") for name, torch in self.torches.items()
+        ]
+        for name, one in self.grasps.items():
+            loads = f"{one.force_n.value:.1f} N, {one.torque_nm.value:.1f} N m"
+            rows.append((f"grasp of {name}", f"drifts {_micro(one.drift_m.value)} um, {loads}"))
+        rows.append(("clearance", f"{_mm(self.clearance_m)} mm, {self.clearance_pair or 'no pair'}"))
+        rows.append(("contacts", str(len(self.contacts))))
+        table = html_table(" ".join(self._headline()), rows)
+        return table + (html_table("not kept", [(str(c),) for c in self.complaints]) if self.complaints else "")
 
     def __str__(self) -> str:
         """Return a small table, at most 79 columns wide."""

@@ -10,6 +10,7 @@ from nlpweld.plan import Plan
 from nlpweld.timing.cycle import Cycle
 from nlpweld.timing.joints import along_seam
 from nlpweld.timing.moves import joined
+from nlpweld.timing.sampling import States
 from nlpweld.timing.wanted import wanted
 from nlpweld.verify.check import refuse_wrong
 from nlpweld.verify.timing import drive_limits
@@ -46,16 +47,18 @@ def time_plan(plan: Plan, speed_m_s: float | None = None, step_s: float = STEP_S
     along = along_seam(plan, wanted(plan, cell.timing.blend_m), wanted(plan, 0.0))
     jerk = np.append(limits[2], np.inf)
     cycle = Cycle(along, cell.timing, limits * (1 - RESERVE), jerk, step)
+    return plan.timed(joined(plan, _free_phases(cycle)))
+
+
+def _free_phases(cycle: Cycle) -> list[tuple[str, States]]:
+    """Return the phases with torches along their own axes, or else straight up; the error is that of the former."""
     try:
-        phases = cycle.phases()
-    except MotionError:
+        return cycle.phases()
+    except MotionError as first:
         try:
-            phases = replace(cycle, upwards=True).phases()
+            return replace(cycle, upwards=True).phases()
         except (MotionError, PlanError):
-            phases = None
-        if phases is None:
-            raise  # of the way along the torches' own axes
-    return plan.timed(joined(plan, phases))
+            raise first from None
 
 
 def _above_zero(value: float, name: str) -> float:

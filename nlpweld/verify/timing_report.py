@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from nlpweld.html_table import html_table
+
 WIDTH = 79
 SHOWN = 8
 REACHED = 1e-4  # of the speed asked, by which a speed that counts as reached may fall short
@@ -159,6 +161,15 @@ class TimingReport:
         """Return plain JSON data, without the array; NaN and infinity become None."""
         told = {name: value for name, value in asdict(self).items() if name != "torch_speed"}
         return {**_plain(told), "feasible": self.feasible}
+
+    def _repr_html_(self) -> str:
+        """Show in a notebook the verdict, when what goes on, what is nearest then, and what is broken."""
+        near = {one.phase: f"{1e3 * one.distance_m:.1f} mm, {one.pair}" for one in self.clearance}
+        rows = [(name, f"{begin:.3f}", f"{end:.3f}", near.get(name, "")) for name, begin, end in self.phases]
+        verdict = "verified" if self.feasible else "NOT verified"
+        title = f"{self.cell}: cycle {self.cycle_s:.3f} s, arc on {self.arc_on_s:.3f} s; {verdict}"
+        table = html_table(title, rows, ("phase", "from [s]", "to [s]", "nearest bodies"))
+        return table + (html_table("failures", [(str(f),) for f in self.failures]) if self.failures else "")
 
     def __str__(self) -> str:
         """Return a small table, at most 80 columns wide."""

@@ -3,10 +3,9 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from nlpweld.errors import OptionError
+from nlpweld.errors import OptionError, missing
 
 BUILT = Path("viewer") / "dist" / "main.min.js"  # exports MeshCat.THREE and MeshCat.Viewer
-MEND = "pip install 'nlpweld[view]'"
 
 
 def bundle() -> tuple[str, str]:
@@ -19,10 +18,11 @@ def bundle() -> tuple[str, str]:
     """
     spec = find_spec("meshcat")
     if spec is None or not spec.submodule_search_locations:
-        raise OptionError(f"view: the package meshcat, whose three.js draws the page, is missing; {MEND}")
+        raise missing("view: meshcat, whose three.js draws the page,", "view")
     path = Path(spec.submodule_search_locations[0]) / BUILT
     licences = path.with_name(f"{path.name}.LICENSE.txt")
     try:
         return path.read_text(encoding="utf-8"), licences.read_text(encoding="utf-8")
     except OSError:
-        raise OptionError(f"view: this meshcat has no {BUILT.as_posix()}; {MEND} --force-reinstall") from None
+        mend = "pip install --force-reinstall 'nlpweld[view]'"
+        raise OptionError(f"view: this meshcat has no {BUILT.as_posix()}; mend it with: {mend}") from None

@@ -63,7 +63,7 @@ def test_an_untimed_plan_is_told_how_to_be_timed(call, plan: Plan, tmp_path: Pat
     code, out, err = call("sim", untimed)
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
-    assert "time it first with 'nlpweld time PLAN --out FILE'" in err
+    assert err == f"nlpweld: {untimed}: timeline: missing; time it first with 'nlpweld time PLAN --out FILE'\n"
 
 
 def test_a_missing_extra_is_told_by_its_command(call, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,6 +78,8 @@ def test_a_missing_extra_is_told_by_its_command(call, path: Path, monkeypatch: p
     [
         (("--from", "5"), "from 5 to 4 s is not within the plan's 0 to 4 s"),
         (("--step-ms", "0"), "--step-ms 0 is not above 0"),
+        (("--step-ms", "1e-9"), "4000 ms are 4e+12 steps of 1e-09 ms; a simulation takes 1 to 2,000,000"),
+        (("--to", "0.0004"), "0.4 ms are 0.4 steps of 1 ms; a simulation takes 1 to 2,000,000"),
         (("--hz", "5000"), "--hz 5000 is not above 0 and at most one per step, 1000"),
     ],
 )

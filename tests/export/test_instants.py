@@ -45,7 +45,7 @@ def test_seam_points_and_ends_of_phases_are_written(plan):
     assert np.abs(t_s * 1e6 - np.round(t_s * 1e6)).max() < 1e-6
 
 
-@pytest.mark.parametrize("every_s", [0.05, 0.3, 100.0])
+@pytest.mark.parametrize("every_s", [0.05, 0.3, 100.0, 1e12])
 def test_a_step_is_kept_and_its_deviation_told(plan, every_s):
     t_s = chosen(plan.timeline, plan.s, every_s)
     assert np.diff(t_s).max() <= every_s + 1e-6

@@ -245,6 +245,9 @@ function phaseStrips() {
       strip.append(part);
     }
     byId("phases").append(strip);
+    new ResizeObserver(() => {
+      for (const part of strip.children) part.classList.toggle("narrow", part.scrollWidth > part.clientWidth);
+    }).observe(strip);
   }
 }
 
