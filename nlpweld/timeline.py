@@ -11,6 +11,7 @@ from scipy.interpolate import PPoly
 
 PHASES = ("approach", "plunge", "weld", "withdraw", "retreat")
 SHORTEST_S = 1e-9  # between two instants
+LARGEST = 1e9  # [s], [rad] and their rates; beyond it quintics overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,8 +167,8 @@ def _array(data: dict[str, Any], name: str, shape: tuple[int, ...], where: str =
         array = np.array(data.get(name), dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{where}: not an array of numbers") from None
-    if not np.isfinite(array).all():
-        raise ValueError(f"{where}: holds NaN or infinity")
+    if not (np.abs(array) < LARGEST).all():
+        raise ValueError(f"{where}: holds NaN or infinity, or nearly")
     if array.ndim != len(shape) or (shape != (-1,) and array.shape != shape):
         raise ValueError(f"{where}: not of shape {shape}" if shape != (-1,) else f"{where}: not a list of numbers")
     return array

@@ -6,6 +6,9 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_val
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
+Rate = Annotated[float, Field(strict=True, ge=1e-6, le=1e9, allow_inf_nan=False)]  # beyond any drive, yet no overflow
+Offset = Annotated[float, Field(strict=True, ge=-1e3, le=1e3, allow_inf_nan=False)]  # a length to either side [m]
+Span = Annotated[float, Field(strict=True, ge=1e-6, le=1e3, allow_inf_nan=False)]  # a length [m], likewise
 NonNegative = Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_+-]*$")]

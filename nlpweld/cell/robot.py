@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from nlpweld.cell.checked import Checked, Finite, Name, Positive, Sourced, Vector
+from nlpweld.cell.checked import Checked, Finite, Name, Positive, Rate, Sourced, Vector
 
 DRIVES = ("speed_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 
@@ -35,9 +35,9 @@ class Joint(Checked):
 class Drives(Sourced):
     """How fast the joints of a robot may move, in their order; a limit that is not stated is not known."""
 
-    speed_deg_s: tuple[Positive, ...]
-    acceleration_deg_s2: tuple[Positive, ...] | None = None
-    jerk_deg_s3: tuple[Positive, ...] | None = None
+    speed_deg_s: tuple[Rate, ...]
+    acceleration_deg_s2: tuple[Rate, ...] | None = None
+    jerk_deg_s3: tuple[Rate, ...] | None = None
 
     @property
     def stated(self) -> dict[str, tuple[float, ...]]:

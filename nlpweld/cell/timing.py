@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from nlpweld.cell.checked import Checked, Finite, Name, NonNegative, Positive, Sourced, Vector
+from nlpweld.cell.checked import Checked, Finite, Name, NonNegative, Offset, Rate, Sourced, Span
 
 
 class Pace(Checked):
@@ -16,9 +16,9 @@ class Pace(Checked):
         jerk_m_s3: along the path.
     """
 
-    speed_m_s: Positive
-    acceleration_m_s2: Positive
-    jerk_m_s3: Positive
+    speed_m_s: Rate
+    acceleration_m_s2: Rate
+    jerk_m_s3: Rate
 
 
 class Timing(Sourced):
@@ -39,7 +39,7 @@ class Timing(Sourced):
 
     torch: Pace
     travel: Pace
-    stand_off_m: Positive
-    carry_m: Vector = (0.0, 0.0, 0.0)
+    stand_off_m: Span
+    carry_m: tuple[Offset, Offset, Offset] = (0.0, 0.0, 0.0)
     home_deg: Annotated[dict[Name, tuple[Finite, ...]], Field(min_length=1)]
     blend_m: NonNegative = 0.0

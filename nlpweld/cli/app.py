@@ -101,7 +101,7 @@ def verify(
     ] = None,
     json: Json = False,
 ) -> int:
-    """Check a plan along the whole seam, apart from whatever made it."""
+    """Check a plan along the whole seam, and its timeline if it is timed, apart from whatever made it."""
     return judge.verify(plan, json, robust, samples)
 
 

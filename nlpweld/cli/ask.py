@@ -151,7 +151,7 @@ def evaluate(
     where = _where(cell, at, placement)
     x = coordinates(cell, where)
     if out is not None:
-        writable(out.parent)
+        writable_file(out)
     nlp = formulate(cell, "robust" if robust else "reduced", engine="numpy")
     with busy(f"evaluating {cell.name}", quiet=json):
         plan, report = evaluate_plan(nlp, x)
@@ -238,6 +238,17 @@ def writable(folder: Path) -> None:
         raise OutputError(f"{existing}: is a file, not a folder; choose another --out")
     if not os.access(existing, os.W_OK | os.X_OK):
         raise OutputError(f"{existing}: cannot be written (permission denied); choose another --out")
+
+
+def writable_file(file: Path) -> None:
+    """Refuse a file that cannot be written, before any work is done.
+
+    Raises:
+        OutputError: it is a folder, or its own folder cannot be written.
+    """
+    if file.is_dir():
+        raise OutputError(f"{file}: is a folder, not a file; choose another name")
+    writable(file.parent)
 
 
 def _where(cell: Cell, at: tuple[float, float, float] | None, placement: str | None) -> tuple[float, float, float]:

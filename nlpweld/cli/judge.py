@@ -12,13 +12,16 @@ from nlpweld.plan import load_plan
 
 
 def verify(path: Path, json: bool, robust: bool = False, samples: int | None = None) -> int:
-    """Print the report of a plan file; 0 when feasible, 1 when not.
+    """Print the report of a plan file, and that of its timeline where it is timed; 0 when all is feasible, 1 when not.
 
     Raises:
+        PlanError: the file is no plan.
+        MotionError: the plan is timed, but its cell has nothing to hold that against.
         OptionError: samples are asked for without errors, or the plan's cell states none.
     """
     from nlpweld.verify.check import verify as verify_
     from nlpweld.verify.robust import SAMPLES, verify_robust
+    from nlpweld.verify.timing import verify_timing
 
     if samples is not None and not robust:
         raise OptionError("--samples: only errors of the set-up are sampled; add --robust")
@@ -34,8 +37,17 @@ def verify(path: Path, json: bool, robust: bool = False, samples: int | None = N
     else:
         with busy("verifying", quiet=json):
             report = verify_(plan)
-    print(json_.dumps(report.to_json()) if json else report)
-    return 0 if report.feasible else 1
+    timing = None
+    if plan.timeline is not None:
+        with busy("verifying the timeline", quiet=json):
+            timing = verify_timing(plan)
+    feasible = report.feasible and (timing is None or timing.feasible)
+    if json:
+        timed = {} if timing is None else {"timing": timing.to_json()}
+        print(json_.dumps({**report.to_json(), **timed, "feasible": feasible}))
+    else:
+        print(report if timing is None else f"{report}\n{timing}")
+    return 0 if feasible else 1
 
 
 def progress_bar(quiet: bool = False) -> Progress:

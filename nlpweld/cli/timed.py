@@ -3,7 +3,7 @@
 import json as json_
 from pathlib import Path
 
-from nlpweld.cli.ask import busy, writable
+from nlpweld.cli.ask import busy, writable_file
 from nlpweld.plan import load_plan, write_bytes
 
 
@@ -20,7 +20,7 @@ def time(path: Path, out: Path | None, speed_m_s: float | None, figure: Path | N
 
     for file in (out, figure):
         if file is not None:
-            writable(file.parent)
+            writable_file(file)
     plan = load_plan(path)
     with busy(f"timing {plan.cell.name}", quiet=json):
         timed = time_plan(plan, speed_m_s)

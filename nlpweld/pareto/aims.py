@@ -51,7 +51,7 @@ def verified_value(aim: Aim, plan: Plan, report: Report) -> float:
 
     Joint travel is the sum over stations and joints of what they turn from point to point, the way back included. The
     quickest pass takes from point to point what the slowest joint, the positioner's included, takes at its full speed:
-    no motion along the seam is quicker, whatever the torch could do.
+    no motion through the plan's points is quicker, whatever the torch could do.
     """
     if aim.name == "clearance_m":
         return report.clearance_along_m
@@ -61,7 +61,10 @@ def verified_value(aim: Aim, plan: Plan, report: Report) -> float:
     if aim.name == "travel_rad":
         return float(sum(stations[station.name].sum() for station in cell.stations))
     taken = [stations[station.name] / speeds_rad_s(station.robot) for station in cell.stations]
-    return float(np.hstack([*taken, turning_s(cell)]).max(axis=1).sum())
+    table = cell.positioner
+    tilted = table is not None and table.name in stations  # the plan tilts the weld, so that the table goes its own way
+    turning = stations[table.name] / speeds_rad_s(table.robot) if table and tilted else turning_s(cell)
+    return float(np.hstack([*taken, turning]).max(axis=1).sum())
 
 
 def speeds_rad_s(robot: Robot) -> np.ndarray:

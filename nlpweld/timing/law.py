@@ -26,7 +26,7 @@ from scipy.interpolate import BSpline
 from nlpweld.errors import MotionError
 from nlpweld.motion import Limits, SCurve, s_curve
 from nlpweld.timing.curve import Curve
-from nlpweld.timing.sampling import MISS_RAD
+from nlpweld.timing.sampling import MISS_RAD, refuse_endless
 
 PER_KNOT = 16  # places between two knots at which limits are looked at
 FEWEST, MOST = 8, 2000  # intervals of knots
@@ -165,13 +165,15 @@ def slowed(curve: Curve, pace: Limits, limits: np.ndarray, begin: float, end: fl
         step_s: greatest time between instants: over which a jump of acceleration is spread.
 
     Raises:
-        MotionError: no slowing was found that keeps the limits.
+        MotionError: no slowing was found that keeps the limits, or it would take over an hour.
     """
     best, quickest_s = None, np.inf
     for share, gentler in product(PACES, RAMPS):
         ramp = share * gentler
         own = Limits(pace.velocity * share, pace.acceleration * ramp**2, pace.jerk * ramp**3)
         task = Task(Run(curve, begin, one_move(end - begin, own)), limits, pace, step_s)
+        if share == gentler == 1.0:
+            refuse_endless(task.least_s, step_s)
         for finer in FINER:
             run = task.run if task.free else task.slowed(finer, quickest_s)
             if run is not None and run.duration_s < quickest_s:
@@ -212,6 +214,11 @@ class Task:
         """Whether nothing binds."""
         return bool(self.cap.min() >= 1 - WITHIN and self.jumps[1].min(initial=1.0) >= 1)
 
+    @property
+    def least_s(self) -> float:
+        """How long it takes at least, the clock nowhere above a cap [s]."""
+        return float(np.trapezoid(1 / np.minimum(self.cap, 1.0), self.u))
+
     def slowed(self, finer: int, quickest_s: float) -> Run | None:
         """Return the run with a clock, or None where it would take longer than the quickest yet.
 
@@ -238,7 +245,7 @@ class Task:
 
     def _cap(self) -> np.ndarray:
         """Return the least cap at every place, shape (M,)."""
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             caps = [(self.bounds[k] / np.abs(self.d[k])).min(axis=1) ** (1 / (k + 1)) for k in range(3)]
         return np.min(caps, axis=0)
 

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nlpweld.errors import MotionError
 from nlpweld.timeline import Track, quintic
 
 CLOSE_S = 1e-4  # instants nearer to each other than this are one: third derivatives lose digits with the cube of it
 MISS_RAD = 2e-8  # by which a quintic may miss the motion half-way between two instants
+MOST = 100_000  # instants of one motion before intervals are halved: over an hour at the usual step
 DEPTH = 8  # halvings of an interval
 LOOKS = 11  # places in an interval at which its jerk is looked at
 State = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -45,8 +47,12 @@ def sampled(
         marks: parameters at which derivatives jump, both ends among them.
         jerk: limits of the columns, shape (J + 1,), infinite for what has none.
         step_s: greatest time between instants [s].
+
+    Raises:
+        MotionError: the motion takes so long that it would have more than :data:`MOST` instants.
     """
     w = spread_out(marks, times)
+    refuse_endless(float(times(w)[-1]), step_s)
     steps = np.maximum(1, np.ceil(np.diff(times(w)) / step_s - 1e-9)).astype(int)
     w = np.concatenate([w[:1], *(np.linspace(a, b, n + 1)[1:] for a, b, n in zip(w, w[1:], steps, strict=False))])
     for _ in range(DEPTH):
@@ -63,6 +69,19 @@ def sampled(
             break
         w = np.sort(np.concatenate([w, both[1::2][missed]]))
     return States(times(w), motion(w))
+
+
+def refuse_endless(duration_s: float, step_s: float) -> None:
+    """Refuse a motion that takes so long, or no finite time, that its instants could not be kept.
+
+    Raises:
+        MotionError: tells how long it would take.
+    """
+    if not duration_s <= MOST * step_s:
+        raise MotionError(
+            f"a phase would take {duration_s:.3g} s, over the {MOST * step_s:g} s there are instants for; raise the "
+            "speed asked, the paces in [timing] or the drives' limits"
+        )
 
 
 def steepest(states: States, jerk: np.ndarray) -> float:

@@ -3,7 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+from pydantic import ValidationError
 
+from nlpweld.cell.complaint import first_complaint
+from nlpweld.cell.timing import Pace
 from nlpweld.errors import MotionError, PlanError
 from nlpweld.motion.limits import finite
 from nlpweld.plan import Plan
@@ -73,5 +76,9 @@ def _at_speed(plan: Plan, speed_m_s: float) -> Plan:
     timing = plan.cell.timing
     if timing is None:
         return plan
-    asked = timing.model_copy(update={"torch": timing.torch.model_copy(update={"speed_m_s": speed_m_s})})
+    try:
+        torch = Pace.model_validate({**timing.torch.model_dump(), "speed_m_s": speed_m_s})
+    except ValidationError as error:
+        raise MotionError(first_complaint(error, {"speed_m_s": speed_m_s})) from None
+    asked = timing.model_copy(update={"torch": torch})
     return replace(plan, cell=plan.cell.model_copy(update={"timing": asked}))

@@ -152,11 +152,10 @@ class Uses:
 def slowed(seen: Moving, torch: OnSeam, uses: Uses) -> list[Slowed]:
     """Return where a torch is slower than asked between its ramps."""
     assert seen.cell.timing is not None
-    v = torch.speed_m_s
-    rises, falls = np.flatnonzero(np.diff(v) <= 0), np.flatnonzero(np.diff(v) >= 0)
-    begin, end = (int(rises[0]) if len(rises) else len(v)), (int(falls[-1]) + 1 if len(falls) else 0)
-    slow = v < seen.cell.timing.torch.speed_m_s * (1 - rules.SPEED)
-    slow[: begin + 1] = slow[end:] = False
+    v, asked = torch.speed_m_s, seen.cell.timing.torch.speed_m_s
+    begin, end = _ramp(v, rules.SPEED * asked), len(v) - _ramp(v[::-1], rules.SPEED * asked)
+    slow = v < asked * (1 - rules.SPEED)
+    slow[:begin] = slow[end:] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(int), [0]])))
     found = []
     for a, b in edges.reshape(-1, 2):
@@ -164,6 +163,13 @@ def slowed(seen: Moving, torch: OnSeam, uses: Uses) -> list[Slowed]:
         where = float(torch.s[a]), float(torch.s[b - 1])
         found.append(Slowed(float(t[0]), float(t[1]), where, float(v[a:b].min()), uses.use(torch.at[a:b])))
     return found
+
+
+def _ramp(v: np.ndarray, noise: float) -> int:
+    """Return how many speeds (K,) a first rise takes until it ends, differences up to the noise not counted."""
+    falls = np.flatnonzero(v < np.maximum.accumulate(v) - noise)
+    top = v[: falls[0] if len(falls) else len(v)].max(initial=0.0)
+    return int(np.argmax(v >= top - noise)) if len(v) else 0
 
 
 def windings(timeline: Timeline, begin_s: float, end_s: float) -> dict[str, tuple[int, ...]]:

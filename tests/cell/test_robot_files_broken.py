@@ -51,7 +51,7 @@ BROKEN = [
     ("infinite", "upper_deg = 120.0", "upper_deg = inf", "joints.1.upper_deg: ", "finite"),
     ("negative_reach", "reach_m = 0.9", "reach_m = -0.9", "reach_m: ", "greater than 0"),
     ("negative_radius", "radius_m = 0.05", "radius_m = -0.05", "bodies.arm.radius_m: ", "greater than 0"),
-    ("negative_speed", "[100.0, 110.0]", "[-100.0, 110.0]", "drives.speed_deg_s.1: ", "greater than 0"),
+    ("negative_speed", "[100.0, 110.0]", "[-100.0, 110.0]", "drives.speed_deg_s.1: ", "greater than or equal"),
     ("speed_of_one_joint", "[100.0, 110.0]", "[100.0]", "drives.speed_deg_s", "1 numbers for 2 joints"),
     ("sign_of_two", "a_m = 0.5", "a_m = 0.5\nsign = 2", "joints.1.sign: ", "got 2"),
     ("truth_for_number", "a_m = 0.5", "a_m = true", "joints.1.a_m: ", "valid number"),

@@ -76,7 +76,7 @@ def test_tables_are_where_files_have_them(page):
 def test_units_bounds_defaults_and_meanings_are_read_off_the_schema(page):
     assert "| `singularity_floor_m3` | number >= 0 | m^3 | required |" in page
     assert "| `sign` | `-1` or `1` |  | `1` |" in page
-    assert "| `jerk_deg_s3` | list of number > 0 | deg/s^3 | none |" in page
+    assert "| `jerk_deg_s3` | list of number >= 1e-06 <= 1e+09 | deg/s^3 | none |" in page
     assert "| `home_deg` | table by name of list of number | deg | required | joints of a welding robot" in page
     assert "| `coupling` | [Grasp](#schema-grasp) or [Torch](#schema-torch) |" in page
 

@@ -1,5 +1,7 @@
 """Aims measured on candidates against the verifier's own numbers, and joint travel with derivatives."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -120,3 +122,15 @@ def test_limited_problem_tells_by_how_much_its_level_is_missed() -> None:
     assert at_least(nlp, side, -0.5 - travel, 0.25).evaluate(x[:1]).feasible.all()
     grown = at_least(nlp, side, 0.5 - travel, 0.25).widened({"singularity": 0.1, "clearance": 0.0, "joint_limit": 0.0})
     assert grown.constraints[-1] == "travel_rad"
+
+
+def test_quickest_pass_of_a_tilted_weld_counts_the_positioners_own_way() -> None:
+    cell = coarse("dual_welder_positioner")
+    plan, report = evaluate_plan(reduced(cell, "numpy"), np.array([0.0, -1.4]))
+    still = verified_value(AIMS["quickest_s"], plan, report)
+    q = plan.paths["positioner"].copy()
+    q[6] += np.array([0.0, 3.0])  # there and back: six radians more of its second axis
+    other = replace(plan, paths={**plan.paths, "positioner": q})
+    flat = {name: np.zeros(len(plan.s)) for name in ("slope", "rotation")}
+    assert verified_value(AIMS["quickest_s"], other, report) == still  # not tilted: the table goes the cell's way
+    assert verified_value(AIMS["quickest_s"], other.with_freedom(flat), report) > still + 1.0
