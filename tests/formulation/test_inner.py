@@ -145,6 +145,7 @@ def limited(k: int, joint: int, lower_deg: float, upper_deg: float, wrist: str =
     data = case("closed")[0].cell.model_dump(mode="json", exclude_unset=True)
     data["stations"][k]["robot"]["joints"][joint] |= {"lower_deg": lower_deg, "upper_deg": upper_deg}
     data["configuration"]["wrist"] = wrist
+    del data["timing"]  # the welder could not wait at its home
     return Redundant(Batch(Cell.model_validate(data), "numpy"), "spin", 8)
 
 
