@@ -9,17 +9,16 @@ Runs of solvers that the folder already holds are not made again.
 
 import argparse
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from common import arguments, told
 from rich.console import Console
 
 from nlpweld.bench.progress import StudyProgress
-from nlpweld.errors import NlpweldError
 from nlpweld.palletising import PalletTask, load_pallet_task, palletize
 from nlpweld.palletising.calibration import (
     NAMES,
@@ -289,23 +288,18 @@ def _text(table: pd.DataFrame, digits: int) -> str:
     return "\n" + markdown(table.map(shown))
 
 
-def main() -> None:
+def main() -> int:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("results/palletising"), help="folder of the study")
+    parser = arguments(__doc__, "results/palletising")
     parser.add_argument("--seeds", type=int, default=5, help="seeds of every solver")
     parser.add_argument("--quick", action="store_true", help="two boxes, a small grid: to see that it works")
     parser.add_argument("--no-figures", action="store_true", help="stop after data and tables")
-    chosen = parser.parse_args()
-    console, began = Console(stderr=True), time.perf_counter()
-    try:
-        found = study(chosen.out, chosen.seeds, console, chosen.quick, not chosen.no_figures)
-    except NlpweldError as error:
-        console.print(f"error: {error}", markup=False, highlight=False)
-        sys.exit(2)
-    print(report(found))
-    console.print(f"{time.perf_counter() - began:.0f} s; tables and figures: {chosen.out}", highlight=False)
+
+    def text(chosen: argparse.Namespace, console: Console) -> str:
+        return report(study(chosen.out, chosen.seeds, console, chosen.quick, not chosen.no_figures))
+
+    return told(parser, text)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

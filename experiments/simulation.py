@@ -14,12 +14,14 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from common import arguments, told
 from rich.console import Console
 
 from nlpweld.bench.progress import StudyProgress
 from nlpweld.cell import load_cell
-from nlpweld.errors import NlpweldError, PlanError
+from nlpweld.errors import PlanError
 from nlpweld.plan import Plan, load_plan, write_bytes, write_text
+from nlpweld.report import markup
 from nlpweld.report.simulation import write_simulation
 from nlpweld.sim.options import Numerics, Servos, SimOptions
 from nlpweld.sim.report import SimReport
@@ -116,11 +118,8 @@ def numbers(report: SimReport) -> dict[str, object]:
 
 
 def markdown(table: pd.DataFrame) -> str:
-    """Return a table as Markdown."""
-    shown = [[f"{v:.3g}" if isinstance(v, float) else str(v) for v in row] for row in table.itertuples(index=False)]
-    rows = [["" if text == "nan" else text for text in row] for row in shown]
-    lines = ["| " + " | ".join(table.columns) + " |", "|" + "---|" * len(table.columns)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
+    """Return a table as Markdown, numbers with three digits and blank where there is none."""
+    return markup.markdown(table.map(lambda v: f"{v:.3g}" if isinstance(v, float) else str(v)).replace("nan", ""))
 
 
 def study(folder: Path, timed_folder: Path | None, console: Console) -> dict[str, pd.DataFrame]:
@@ -174,20 +173,16 @@ def _rows(heading: str, reports: dict[str, SimReport]) -> pd.DataFrame:
     return pd.DataFrame([{heading: name, **numbers(report)} for name, report in reports.items()])
 
 
-def main() -> None:
+def main() -> int:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("results/simulation"), help="folder of the study")
+    parser = arguments(__doc__, "results/simulation")
     parser.add_argument("--timed", type=Path, help="folder of timed plans")
-    options = parser.parse_args()
-    console = Console(stderr=True)
-    try:
-        for table in study(options.out, options.timed, console).values():
-            print(markdown(table))
-    except NlpweldError as error:
-        console.print(f"error: {error}", markup=False, highlight=False)
-        sys.exit(2)
+
+    def tables(chosen: argparse.Namespace, console: Console) -> str:
+        return "\n".join(map(markdown, study(chosen.out, chosen.timed, console).values()))
+
+    return told(parser, tables)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

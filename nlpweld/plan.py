@@ -2,7 +2,7 @@
 
 import json
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -60,6 +60,17 @@ class Plan:
     def with_freedom(self, freedom: Mapping[str, np.ndarray] | None) -> "Plan":
         """Return a copy with these offsets of free angles, each of shape (N,) [rad], or with none."""
         return replace(self, freedom=None if freedom is None else dict(freedom))
+
+    @property
+    def needed_timeline(self) -> Timeline:
+        """The timeline, of a plan that has to have one.
+
+        Raises:
+            PlanError: the plan is not timed.
+        """
+        if self.timeline is None:
+            raise PlanError("timeline: missing; time it first with 'nlpweld time PLAN --out FILE'")
+        return self.timeline
 
     def timed(self, timeline: Timeline | None) -> "Plan":
         """Return a copy with this time axis, or with none."""
@@ -253,6 +264,17 @@ def write_text(path: str | Path, text: str) -> Path:
         OutputError: the folder or file cannot be written.
     """
     return write_bytes(path, text.encode())
+
+
+def refuse_existing(paths: Iterable[Path], force: bool) -> None:
+    """Refuse files that exist already, unless they are to be replaced.
+
+    Raises:
+        OutputError: one exists, and ``force`` is not set.
+    """
+    for path in paths:
+        if path.exists() and not force:
+            raise OutputError(f"{path}: exists; add --force to replace it, or choose another name")
 
 
 def write_bytes(path: str | Path, data: bytes) -> Path:

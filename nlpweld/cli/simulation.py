@@ -5,8 +5,8 @@ from pathlib import Path
 
 from nlpweld.cli.ask import writable
 from nlpweld.cli.judge import progress_bar
-from nlpweld.errors import OutputError, PlanError
-from nlpweld.plan import load_plan
+from nlpweld.errors import PlanError
+from nlpweld.plan import load_plan, refuse_existing
 
 
 def sim(
@@ -33,8 +33,7 @@ def sim(
     plan = load_plan(path)
     if out is not None:
         writable(out)
-        if (out / REPORT).exists() and not force:
-            raise OutputError(f"{out / REPORT}: exists; add --force to write over it, or choose another --out")
+        refuse_existing([out / REPORT], force)
     options = chosen(hz, step_ms)
     try:
         set_up = stage(plan, options, span_s)

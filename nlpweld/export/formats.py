@@ -5,13 +5,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from nlpweld.errors import OptionError, OutputError
+from nlpweld.errors import OptionError
 from nlpweld.export.joint_csv import joint_csv
 from nlpweld.export.krl import krl
 from nlpweld.export.moves import Moves, moves_of
 from nlpweld.export.rapid import rapid
 from nlpweld.export.ros2 import ros2_json, ros2_yaml
-from nlpweld.plan import Plan, write_text
+from nlpweld.plan import Plan, refuse_existing, write_text
 
 FORMATS: dict[str, Callable[[Moves], dict[str, str]]] = {
     "csv": joint_csv,
@@ -49,9 +49,7 @@ class Export:
             OutputError: one of them exists, and then none is written; or one cannot be written.
         """
         paths = [Path(folder) / name for name in self.files]
-        for path in paths:
-            if path.exists() and not force:
-                raise OutputError(f"{path}: exists; add --force to replace it, or choose another --out")
+        refuse_existing(paths, force)
         return [write_text(path, text) for path, text in zip(paths, self.files.values(), strict=True)]
 
 

@@ -6,7 +6,7 @@ A target is ``{A1 .., .., A6 .., E1 .., ..}`` in degrees. The points are in the 
 import numpy as np
 
 from nlpweld.export.moves import Moves
-from nlpweld.export.text import degrees, head, module_names, refuse_other_arms, rendered
+from nlpweld.export.text import degrees, programs, rendered
 
 LONGEST_NAME = 24
 
@@ -17,21 +17,12 @@ def krl(moves: Moves) -> dict[str, str]:
     Raises:
         OptionError: a robot does not have six joints.
     """
-    refuse_other_arms(moves, "krl")
-    names = module_names(moves, LONGEST_NAME)
-    files: dict[str, str] = {}
-    for k, (name, mover) in enumerate(zip(names, moves.robots, strict=True)):
-        outer = moves.positioner.q if moves.positioner and k == 0 else np.empty((len(moves.t_s), 0))
-        targets = [_target(q, e) for q, e in zip(mover.q, outer, strict=True)]
-        values: dict[str, object] = {
-            "name": name,
-            "head": head(moves, mover),
-            "robots": len(names),
-            "targets": targets,
-            "moves": moves,
-        }
-        files |= {f"{name}.{kind}": rendered(f"program.{kind}.j2", **values) for kind in ("src", "dat")}
-    return files
+    made = programs(moves, "krl", LONGEST_NAME, _target)
+    return {
+        f"{values['name']}.{kind}": rendered(f"program.{kind}.j2", **values)
+        for values in made
+        for kind in ("src", "dat")
+    }
 
 
 def _target(q: np.ndarray, outer: np.ndarray) -> str:

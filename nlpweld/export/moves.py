@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 
 from nlpweld.cell.robot import Robot
-from nlpweld.errors import PlanError
 from nlpweld.export.instants import TICK_S, chosen, deviation_rad
 from nlpweld.plan import Plan
 from nlpweld.timeline import Timeline
@@ -88,9 +87,7 @@ def moves_of(plan: Plan, every_s: float | None = None) -> Moves:
         PlanError: the plan is not timed.
         OptionError: a step that cannot be used.
     """
-    timeline = plan.timeline
-    if timeline is None:
-        raise PlanError("timeline: missing; time it first with 'nlpweld time PLAN --out FILE'")
+    timeline = plan.needed_timeline
     t_s = chosen(timeline, plan.s, every_s)
     held = plan.cell.positioner
     motion = [timeline.at(t_s, derivative) for derivative in range(3)]

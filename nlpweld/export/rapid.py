@@ -6,7 +6,7 @@ A target is ``[[axes 1 to 6], [eax_a to eax_f]]`` in degrees; ``9E9`` stands for
 import numpy as np
 
 from nlpweld.export.moves import Moves
-from nlpweld.export.text import degrees, head, module_names, refuse_other_arms, rendered
+from nlpweld.export.text import degrees, programs, rendered
 
 EXTERNAL = 6
 LONGEST_NAME = 32
@@ -18,16 +18,8 @@ def rapid(moves: Moves) -> dict[str, str]:
     Raises:
         OptionError: a robot does not have six joints.
     """
-    refuse_other_arms(moves, "rapid")
-    names = module_names(moves, LONGEST_NAME)
-    files = {}
-    for k, (name, mover) in enumerate(zip(names, moves.robots, strict=True)):
-        outer = moves.positioner.q if moves.positioner and k == 0 else np.empty((len(moves.t_s), 0))
-        targets = [_target(q, e) for q, e in zip(mover.q, outer, strict=True)]
-        files[f"{name}.mod"] = rendered(
-            "module.mod.j2", name=name, head=head(moves, mover), tasks=len(names), targets=targets, moves=moves
-        )
-    return files
+    made = programs(moves, "rapid", LONGEST_NAME, _target)
+    return {f"{values['name']}.mod": rendered("module.mod.j2", **values) for values in made}
 
 
 def _target(q: np.ndarray, outer: np.ndarray) -> str:

@@ -2,14 +2,17 @@
 
 import math
 import re
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from nlpweld.errors import OptionError
 from nlpweld.export.moves import Mover, Moves
 
+Target = Callable[[np.ndarray, np.ndarray], str]
 DIGITS = 6  # after the point: more than the seven significant ones of a controller's 32-bit number can hold
 
 
@@ -36,6 +39,26 @@ def rendered(template: str, **values: Any) -> str:
     )
     environment.filters |= {"number": number, "degrees": degrees}
     return environment.get_template(template).render(**values)
+
+
+def programs(moves: Moves, language: str, longest_name: int, target: Target) -> Iterator[dict[str, Any]]:
+    """Yield for every robot what the template of its program takes; the positioner's axes go with the first robot.
+
+    Args:
+        moves: what is written.
+        language: its name as a format.
+        longest_name: how many characters the name of a program may have.
+        target: joints (6,) and external axes (e,) [rad] to the text of a target.
+
+    Raises:
+        OptionError: a robot does not have six joints.
+    """
+    refuse_other_arms(moves, language)
+    names = module_names(moves, longest_name)
+    for k, (name, mover) in enumerate(zip(names, moves.robots, strict=True)):
+        outer = moves.positioner.q if moves.positioner and k == 0 else np.empty((len(moves.t_s), 0))
+        targets = [target(q, e) for q, e in zip(mover.q, outer, strict=True)]
+        yield {"name": name, "head": head(moves, mover), "robots": len(names), "targets": targets, "moves": moves}
 
 
 def module_names(moves: Moves, longest: int) -> list[str]:

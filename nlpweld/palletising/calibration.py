@@ -134,8 +134,8 @@ def combinations(task: PalletTask) -> dict[str, float]:
     """
     lift, braked, free = task.axes.B.limits, 0.0, 0.0
     for way in (task.cycle.rise_m, task.cycle.drop_m):
-        braked += float(np.squeeze(s_curve(np.array(way), lift).duration_s))
-        free += float(np.squeeze(unbraked_time(np.array(way), lift)))
+        braked += float(s_curve(np.array(way), lift).duration_s)
+        free += float(unbraked_time(np.array(way), lift))
     return {"braking_s": braked - free, "leg_s": braked + float(legs(task).beside_s.mean())}
 
 

@@ -40,13 +40,13 @@ def motions(task: PalletTask, box: int, cycle: Cycle, z_max_m: float) -> list[Mo
     """
     leg, z = legs(task).of(box), np.array(z_max_m)
     stages = before(leg) if cycle == "before" else after(leg, z)
-    t_1, t_2, t_3 = (float(np.squeeze(t)) for t in (stages.up_s, stages.across_s, stages.down_s))
+    t_1, t_2, t_3 = (float(t) for t in (stages.up_s, stages.across_s, stages.down_s))
     if cycle == "before":
         across = _slowed(_b(task, leg.z_2 - leg.z_1), t_2, task)
         lift = [(0.0, _b(task, leg.z_1 - leg.z_0)), (t_1, across), (t_1 + t_2, _b(task, leg.z_3 - leg.z_2))]
     else:
         down = leg.down(z)
-        lift = [(0.0, leg.up(z)), (t_1 + t_2 + t_3 - float(np.squeeze(down.duration_s)), down)]
+        lift = [(0.0, leg.up(z)), (t_1 + t_2 + t_3 - float(down.duration_s), down)]
     way, axes = ways(task), task.axes
     others = (("A", way.swing_deg, axes.A), ("C", way.reach_m, axes.C), ("D", way.wrist_deg, axes.D))
     beside = [Motion(name, t_1, _slowed(_move(all_[box], axis.limits), t_2, task)) for name, all_, axis in others]
@@ -67,7 +67,7 @@ def velocities(task: PalletTask, box: int, z_max_m: float, count: int = 401) -> 
     parts = []
     for cycle in ("before", "after"):
         moves = motions(task, box, cycle, z_max_m)
-        t = np.linspace(0.0, max(move.start_s + float(np.squeeze(move.curve.duration_s)) for move in moves), count)
+        t = np.linspace(0.0, max(move.start_s + float(move.curve.duration_s) for move in moves), count)
         columns = {f"{axis}_{unit}_s": at(moves, axis, t, 1) for axis, unit in AXES.items()}
         parts.append(pd.DataFrame({"cycle": cycle, "t_s": t} | columns))
     return pd.concat(parts, ignore_index=True)
@@ -91,9 +91,9 @@ def _b(task: PalletTask, way: float) -> SCurve:
 
 
 def _move(way: float, limits: Limits) -> SCurve:
-    return s_curve(np.array([way]), limits)
+    return s_curve(np.array(way), limits)
 
 
 def _slowed(curve: SCurve, duration_s: float, task: PalletTask) -> SCurve:
     """Return a move that arrives with the others, where axes are synchronised."""
-    return curve.stretched(np.array([duration_s])) if task.cycle.synchronised else curve
+    return curve.stretched(np.array(duration_s)) if task.cycle.synchronised else curve

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nlpweld.errors import PlanError
 from nlpweld.plan import Plan
 from nlpweld.report import style
 from nlpweld.timeline import Timeline
@@ -36,14 +35,13 @@ def timeline(plan: Plan, torch_speed: np.ndarray) -> Figure:
     Raises:
         PlanError: the plan is not timed.
     """
-    if plan.timeline is None:
-        raise PlanError("the plan has no timeline; time it with 'nlpweld time'")
-    t = np.unique(np.concatenate([np.linspace(0, plan.timeline.duration_s, SAMPLES), plan.timeline.t_s]))
+    line = plan.needed_timeline
+    t = np.unique(np.concatenate([np.linspace(0, line.duration_s, SAMPLES), line.t_s]))
     fig = style.figure(110, columns=2)
     upper, lower = fig.subplots(2, 1, sharex=True, height_ratios=(1, 2))
     upper.plot(torch_speed[0], 1e3 * torch_speed[1], color=style.INK)
     style.name_axes(upper, "", "torch speed [mm/s]", f"{plan.cell.name}: cycle {t[-1]:.2f} s")
-    rates = plan.timeline.at(t, 1)
+    rates = line.at(t, 1)
     for i, (name, limits) in enumerate(_speed_limits(plan).items()):
         used = 100 * np.abs(rates[name]) / limits
         lower.plot(t, np.maximum(used.max(axis=1), LEAST), label=style.pretty(name), **style.look(i))
@@ -52,7 +50,7 @@ def timeline(plan: Plan, torch_speed: np.ndarray) -> Figure:
     lower.set_ylim(LEAST, 120.0)
     upper.set_ylim(bottom=0)
     for axes in (upper, lower):
-        _shade(axes, plan.timeline)
+        _shade(axes, line)
     lower.set_xlim(0, float(t[-1]))
     style.legend_below(lower, 4)
     return fig

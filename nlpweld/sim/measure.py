@@ -11,7 +11,6 @@ from nlpweld.sim.planned import (
     carried_work,
     planned,
     planned_tcps,
-    timeline_of,
     weld_points,
     welding,
 )
@@ -36,16 +35,17 @@ def series(plan: Plan, kept: Recording) -> pd.DataFrame:
     """
     columns: dict[str, np.ndarray] = {
         "t_s": kept.t_s,
-        "s": timeline_of(plan).s_at(kept.t_s),
+        "s": plan.needed_timeline.s_at(kept.t_s),
         "welding": welding(plan, kept.t_s),
     }
-    columns |= _torches(plan, kept) | _grasps(plan, kept) | _servos(plan, kept)
+    meant = planned_tcps(plan, kept.t_s)
+    columns |= _torches(plan, kept, meant) | _grasps(plan, kept, meant) | _servos(plan, kept)
     return pd.DataFrame(columns | {"clearance_m": kept.clearance_m})
 
 
-def _torches(plan: Plan, kept: Recording) -> dict[str, np.ndarray]:
-    """Return errors of torches against the seam, and of all TCPs against the plan."""
-    columns, meant, on = {}, planned_tcps(plan, kept.t_s), welding(plan, kept.t_s)
+def _torches(plan: Plan, kept: Recording, meant: np.ndarray) -> dict[str, np.ndarray]:
+    """Return errors of torches against the seam, and of all TCPs against the planned ones (K, S, 4, 4)."""
+    columns, on = {}, welding(plan, kept.t_s)
     for k, station in enumerate(plan.cell.stations):
         if not isinstance(station.coupling, Grasp):
             p_C = weld_points(plan, station, kept.t_s)
@@ -57,13 +57,13 @@ def _torches(plan: Plan, kept: Recording) -> dict[str, np.ndarray]:
     return columns
 
 
-def _grasps(plan: Plan, kept: Recording) -> dict[str, np.ndarray]:
-    """Return drifts, gaps and forces at the grasps."""
+def _grasps(plan: Plan, kept: Recording, meant: np.ndarray) -> dict[str, np.ndarray]:
+    """Return drifts, gaps and forces at the grasps; ``meant`` as in :func:`_torches`."""
     carriers = handlers(plan.cell)
     if not carriers:
         return {}
     columns: dict[str, np.ndarray] = {}
-    meant, work = planned_tcps(plan, kept.t_s), carried_work(plan, kept.t_s)
+    work = carried_work(plan, kept.t_s)
     order = [station.name for station in plan.cell.stations]
     for g, station in enumerate(carriers):
         assert isinstance(station.coupling, Grasp)
@@ -90,7 +90,7 @@ def _squeeze(first: np.ndarray, last: np.ndarray, kept: Recording, plan: Plan) -
 
 def _servos(plan: Plan, kept: Recording) -> dict[str, np.ndarray]:
     """Return torque and error of every joint."""
-    off = kept.q - planned(plan.cell, timeline_of(plan), kept.t_s)
+    off = kept.q - planned(plan.cell, plan.needed_timeline, kept.t_s)
     names = [f"{name}.J{k + 1}" for name, n in joint_counts(plan.cell).items() for k in range(n)]
     columns = {f"servo_nm.{name}": kept.torque_nm[:, i] for i, name in enumerate(names)}
     return columns | {f"servo_error_rad.{name}": off[:, i] for i, name in enumerate(names)}

@@ -10,12 +10,6 @@ from nlpweld.verify import reference as ref
 from nlpweld.verify.freedom import Offsets
 
 
-def timeline_of(plan: Plan) -> Timeline:
-    """Return the timeline of a plan that has one."""
-    assert plan.timeline is not None
-    return plan.timeline
-
-
 def planned(cell: Cell, timeline: Timeline, t_s: np.ndarray, derivative: int = 0) -> np.ndarray:
     """Return all joints' planned angles at instants (K,), or a derivative of them, shape (K, n) [rad; s].
 
@@ -27,14 +21,14 @@ def planned(cell: Cell, timeline: Timeline, t_s: np.ndarray, derivative: int = 0
 
 def planned_tcps(plan: Plan, t_s: np.ndarray) -> np.ndarray:
     """Return T_W_E of every station in order as planned, shape (K, S, 4, 4)."""
-    at = timeline_of(plan).at(t_s)
+    at = plan.needed_timeline.at(t_s)
     tcps = [ref.tcp_pose(station, ref.link_poses(station, at[station.name])) for station in plan.cell.stations]
     return np.stack(tcps, axis=1)
 
 
 def welding(plan: Plan, t_s: np.ndarray) -> np.ndarray:
     """Tell at which instants the plan welds, shape (K,)."""
-    begin, end = timeline_of(plan).span_s("weld")
+    begin, end = plan.needed_timeline.span_s("weld")
     return (begin <= t_s) & (t_s <= end) & (begin < end)
 
 
@@ -43,10 +37,10 @@ def carried_by(plan: Plan) -> Station:
 
     The others are measured against it where their paths do not fit together; the first, of equals within a micrometre.
     """
-    carriers = handlers(plan.cell)
-    begin, end = timeline_of(plan).span_s("weld")
+    carriers, line = handlers(plan.cell), plan.needed_timeline
+    begin, end = line.span_s("weld")
     t_s = np.linspace(begin, end, 50)
-    at, s = timeline_of(plan).at(t_s), timeline_of(plan).s_at(t_s)
+    at, s = line.at(t_s), line.s_at(t_s)
     off_m = []
     for station in carriers:
         wanted = ref.required_pose(plan.cell, station, plan.placement, s, free=_free(plan))
@@ -59,7 +53,7 @@ def carried_work(plan: Plan, t_s: np.ndarray) -> np.ndarray:
     """Return T_W_C as :func:`carried_by` holds it on its planned path, shape (K, 4, 4)."""
     station = carried_by(plan)
     assert isinstance(station.coupling, Grasp)
-    tcp = ref.tcp_pose(station, ref.link_poses(station, timeline_of(plan).at(t_s)[station.name]))
+    tcp = ref.tcp_pose(station, ref.link_poses(station, plan.needed_timeline.at(t_s)[station.name]))
     return tcp @ np.linalg.inv(station.coupling.T_C_E)
 
 
@@ -67,7 +61,7 @@ def weld_points(plan: Plan, station: Station, t_s: np.ndarray) -> np.ndarray:
     """Return where on the workpiece a torch's TCP belongs while welding, in C, shape (K, 3) [m]."""
     coupling, cell = station.coupling, plan.cell
     assert not isinstance(coupling, Grasp)
-    s = timeline_of(plan).s_at(t_s)
+    s = plan.needed_timeline.s_at(t_s)
     weld = ref.weld_pose(cell, s, coupling.seam)
     if coupling.angles is None:
         return weld[:, :3, 3]

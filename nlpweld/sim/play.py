@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from nlpweld.errors import OptionError, PlanError
+from nlpweld.errors import OptionError
 from nlpweld.plan import Plan
 from nlpweld.sim.control import control_signal, servo_gains
 from nlpweld.sim.mj import mujoco, without_log
@@ -52,9 +52,7 @@ def stage(plan: Plan, options: SimOptions, span_s: tuple[float | None, float | N
         OptionError: MuJoCo is missing, or the span is not within the timeline, shorter than a step or of too many.
         PlanError: the plan is not timed.
     """
-    if plan.timeline is None:
-        raise PlanError("timeline: missing; time it first with 'nlpweld time PLAN --out FILE'")
-    timeline, cell = plan.timeline, plan.cell
+    timeline, cell = plan.needed_timeline, plan.cell
     begin = 0.0 if span_s[0] is None else span_s[0]
     end = timeline.duration_s if span_s[1] is None else span_s[1]
     if not 0.0 <= begin < end <= timeline.duration_s:

@@ -1,6 +1,5 @@
 """What a simulation found, in numbers, and whether it kept its levels."""
 
-import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -9,6 +8,7 @@ from typing import Any
 from nlpweld.html_table import html_table
 from nlpweld.sim.options import SimOptions
 from nlpweld.sim.recording import Contact
+from nlpweld.verify.report import plain
 
 WIDTH = 79
 SHOWN = 8
@@ -145,8 +145,8 @@ class SimReport:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON data; NaN and infinity become None."""
-        plain: dict[str, Any] = _plain({"holds": self.holds, **asdict(self)})
-        return plain
+        told: dict[str, Any] = plain({"holds": self.holds, **asdict(self)})
+        return told
 
     def _repr_html_(self) -> str:
         """Show in a notebook the verdict, how torches and grasps did at worst, and what was not kept."""
@@ -248,12 +248,3 @@ def _micro(value: float) -> str:
 
 def _when(peak: Peak) -> str:
     return f"{peak.at_s:.2f}"
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON takes it."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -9,7 +9,7 @@ from nlpweld.cell import Grasp
 from nlpweld.plan import Plan, joint_counts
 from nlpweld.sim.model import handlers
 from nlpweld.sim.options import Levels, SimOptions
-from nlpweld.sim.planned import planned, timeline_of
+from nlpweld.sim.planned import planned
 from nlpweld.sim.recording import Recording
 from nlpweld.sim.report import Complaint, GraspResult, Peak, SimReport, TorchResult, deepest
 from nlpweld.verify.scene import limits_rad
@@ -79,7 +79,7 @@ def _complaints(
 def _stops(plan: Plan, kept: Recording) -> list[Complaint]:
     """Return the joints whose planned angles leave their limits, each at the worst instant."""
     low, high = np.vstack(list(limits_rad(plan.cell).values())).T
-    meant = planned(plan.cell, timeline_of(plan), kept.t_s)
+    meant = planned(plan.cell, plan.needed_timeline, kept.t_s)
     beyond = np.maximum(low - meant, meant - high)
     names = [f"{name}.J{k + 1}" for name, n in joint_counts(plan.cell).items() for k in range(n)]
     worst = beyond.argmax(axis=0)

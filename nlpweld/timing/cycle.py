@@ -27,6 +27,7 @@ from nlpweld.timing.off_seam import (
 )
 from nlpweld.timing.sampling import States
 from nlpweld.verify.apart_in_time import apart
+from nlpweld.verify.scene import limits_rad
 
 MOST = 64  # ways tried in one phase
 SLACK_RAD = 1e-9  # by which rounding may exceed a joint's limit
@@ -79,6 +80,13 @@ class Cycle:
         """The way of every torch back from the seam's start (False) and end (True)."""
         ends = [(name, end) for name in self._welders for end in (False, True)]
         return {(name, end): stand_off(self.along, name, end, self._back(name, end)) for name, end in ends}
+
+    @cached_property
+    def _carries(self) -> dict[tuple[str, bool], Curve | None]:
+        """The way of every handler to where the work is taken over, whichever way torches go."""
+        handlers = [station.name for station in self.along.plan.cell.stations if station.name not in self._welders]
+        ends, offset_W = [(name, end) for name in handlers for end in (False, True)], np.array(self.timing.carry_m)
+        return {(name, end): carry(self.along, name, end, offset_W) for name, end in ends}
 
     def _back(self, name: str, at_end: bool) -> np.ndarray:
         return back_off(self.along, name, at_end, self.timing.stand_off_m, self.upwards)
@@ -133,10 +141,11 @@ class Cycle:
                 before[own[name]] = stops[0]
                 parts.append(Part(own[name], joint_moves(stops, self.limits[:, own[name]])))
                 continue
-            curve = carry(self.along, name, at_end, np.array(self.timing.carry_m))
+            curve = self._carries[name, at_end]
             if curve is not None:
-                parts.append(self._line(name, curve if at_end else backwards(curve)))
-                before[own[name]] = (curve if at_end else backwards(curve)).at(np.array([-np.inf]))[0]
+                curve = curve if at_end else backwards(curve)
+                parts.append(self._line(name, curve))
+                before[own[name]] = curve.at(np.array([-np.inf]))[0]
         if cell.positioner is not None and at_end:
             back = own[cell.positioner.name]
             parts.append(Part(back, joint_moves([rest[back], self._end(False)[back]], self.limits[:, back])))
@@ -144,11 +153,9 @@ class Cycle:
 
     def _checked(self, phase: str, states: States) -> States:
         """Refuse states outside the joints' limits."""
-        cell = self.along.plan.cell
-        robots = {station.name: station.robot for station in cell.stations}
-        robots |= {cell.positioner.name: cell.positioner.robot} if cell.positioner else {}
+        of_all = limits_rad(self.along.plan.cell)
         for name, own in self.along.columns.items():
-            q, limits = states.x[0][:, own], robots[name].limits_rad
+            q, limits = states.x[0][:, own], of_all[name]
             beyond = np.maximum(limits[:, 0] - q, q - limits[:, 1]).max(axis=0)
             joint = int(beyond.argmax())
             if not beyond[joint] <= SLACK_RAD:

@@ -124,12 +124,6 @@ class Run:
         return float(self.times(marks)[-1])
 
 
-def one_move(length: float, limits: Limits) -> SCurve:
-    """Return the S-curve of one move, its numbers without axes."""
-    move = s_curve(np.array([length]), limits)
-    return SCurve(*(x.reshape(()) for x in (move.displacement, move.jerk, move.jerk_s, move.rise_s, move.cruise_s)))
-
-
 def pieces(pace: SCurve) -> np.ndarray:
     """Return when the pieces of one S-curve begin and end, shape (8,) [s]."""
     ramp, rise, cruise = float(pace.jerk_s), float(pace.rise_s), float(pace.cruise_s)
@@ -147,7 +141,7 @@ def paced(curve: Curve, pace: Limits, limits: np.ndarray, begin: float = 0.0, en
         begin: where on the curve it begins.
         end: where it ends; with the curve by default.
     """
-    run = Run(curve, begin, one_move((curve.ends[-1] if end is None else end) - begin, pace))
+    run = Run(curve, begin, s_curve(np.array((curve.ends[-1] if end is None else end) - begin), pace))
     u = _places(run)
     used = np.stack([(np.abs(run.at(u, k + 1)) / limits[k]).max() ** (1 / (k + 1)) for k in range(3)])
     return Run(curve, begin, run.pace, None, max(1.0, float(used.max())))
@@ -171,7 +165,7 @@ def slowed(curve: Curve, pace: Limits, limits: np.ndarray, begin: float, end: fl
     for share, gentler in product(PACES, RAMPS):
         ramp = share * gentler
         own = Limits(pace.velocity * share, pace.acceleration * ramp**2, pace.jerk * ramp**3)
-        task = Task(Run(curve, begin, one_move(end - begin, own)), limits, pace, step_s)
+        task = Task(Run(curve, begin, s_curve(np.array(end - begin), own)), limits, pace, step_s)
         if share == gentler == 1.0:
             refuse_endless(task.least_s, step_s)
         for finer in FINER:

@@ -204,7 +204,7 @@ class Report:
         shallow["worst_case"] = self.worst_case and asdict(self.worst_case)
         if profile:
             shallow["profile"] = {name: array.tolist() for name, array in self.profile.items()}
-        return {name: _plain(value) for name, value in shallow.items()}
+        return {name: plain(value) for name, value in shallow.items()}
 
     def __str__(self) -> str:
         """Return a small table, at most 80 columns wide."""
@@ -303,12 +303,12 @@ def worst_first(violations: list[Violation] | tuple[Violation, ...]) -> tuple[Vi
     return tuple(sorted(kept.values(), key=lambda v: -v.severity))
 
 
-def _plain(value: Any) -> Any:
-    """Return a value as JSON takes it."""
+def plain(value: Any) -> Any:
+    """Return a value as JSON takes it: lists for tuples, None for NaN and infinity."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     return value

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from nlpweld.html_table import html_table
+from nlpweld.verify.report import plain
 
 WIDTH = 79
 SHOWN = 8
@@ -160,7 +161,7 @@ class TimingReport:
     def to_json(self) -> dict[str, Any]:
         """Return plain JSON data, without the array; NaN and infinity become None."""
         told = {name: value for name, value in asdict(self).items() if name != "torch_speed"}
-        return {**_plain(told), "feasible": self.feasible}
+        return {**plain(told), "feasible": self.feasible}
 
     def _repr_html_(self) -> str:
         """Show in a notebook the verdict, when what goes on, what is nearest then, and what is broken."""
@@ -230,14 +231,3 @@ def _turns(which: dict[str, tuple[int, ...]]) -> str:
     """Return whole turns as text, those of joints that made none left out."""
     rows = ((name, k, turns) for name, row in which.items() for k, turns in enumerate(row, start=1))
     return ", ".join(f"{name} J{k} {turns:+d}" for name, k, turns in rows if turns)
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON takes it."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -9,8 +9,8 @@ from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 
-from nlpweld.errors import OptionError, OutputError
-from nlpweld.plan import Plan, load_plan, write_text
+from nlpweld.errors import OptionError
+from nlpweld.plan import Plan, load_plan, refuse_existing, write_text
 from nlpweld.verify import verify
 from nlpweld.view.bundle import bundle
 from nlpweld.view.content import content
@@ -45,8 +45,7 @@ def write_view(
         raise OptionError(f"view: {len(plans)} plans; give one, or two to see them side by side")
     if names is not None and len(names) != len(plans):
         raise OptionError(f"view: {len(names)} names for {len(plans)} plans; give one each")
-    if path.exists() and not force:
-        raise OutputError(f"{path}: exists; add --force to overwrite it")
+    refuse_existing([path], force)
     library = bundle()
     loaded = [plan if isinstance(plan, Plan) else load_plan(plan) for plan in plans]
     return write_text(path, page(loaded, names or called(plans), library))

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-import ruckig
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.s_curves import by_ruckig
 from nlpweld.errors import MotionError
 from nlpweld.motion import Limits, s_curve, synchronised
 from tests.motion.moves import edges, moves
@@ -99,14 +99,7 @@ def test_million_moves_keep_their_limits() -> None:
 def test_hundred_thousand_moves_take_as_long_as_ruckig_says() -> None:
     L, limits = moves(100_000, 1.5, seed=3)
     ours = s_curve(L, limits).duration_s
-    planner, asked, found = ruckig.Ruckig(1), ruckig.InputParameter(1), ruckig.Trajectory(1)
-    theirs = np.empty(len(L))
-    rows = zip(L, limits.velocity, limits.acceleration, limits.jerk, strict=True)
-    for k, (length, velocity, acceleration, jerk) in enumerate(rows):
-        asked.target_position = [length]
-        asked.max_velocity, asked.max_acceleration, asked.max_jerk = [velocity], [acceleration], [jerk]
-        planner.calculate(asked, found)
-        theirs[k] = found.duration
+    theirs = by_ruckig(L, limits)
     assert ours == pytest.approx(theirs, rel=1e-9)
 
 

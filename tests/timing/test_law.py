@@ -6,10 +6,10 @@ import toppra
 from scipy.interpolate import BSpline
 from toppra import algorithm, constraint
 
-from nlpweld.motion import Limits
+from nlpweld.motion import Limits, s_curve
 from nlpweld.timeline import Track, quintic
 from nlpweld.timing.curve import Curve, curve_through, split
-from nlpweld.timing.law import Run, Task, one_move, slowed
+from nlpweld.timing.law import Run, Task, slowed
 from nlpweld.timing.moves import in_a_row
 
 PACE = Limits(np.array(0.05), np.array(0.5), np.array(5.0))
@@ -62,7 +62,9 @@ def test_slowing_keeps_every_limit_between_instants_and_the_pace_elsewhere(runs)
 
 
 def test_what_a_clock_uses_of_limits_is_what_differences_say(path):
-    task = Task(Run(path, 0.0, one_move(LENGTH, PACE)), np.hstack([JERKY, np.full((3, 1), np.inf)]), PACE, 0.05)
+    task = Task(
+        Run(path, 0.0, s_curve(np.array(LENGTH), PACE)), np.hstack([JERKY, np.full((3, 1), np.inf)]), PACE, 0.05
+    )
     end = float(task.run.pace.duration_s)
     knots = np.arange(-3, 84) * (end / 80)
     clock = BSpline(knots, 0.6 + 0.3 * np.cos(1.9 * np.arange(83)), 3)
